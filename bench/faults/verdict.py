@@ -12,7 +12,7 @@ from typing import Any
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.runs.replay.run import Run, read_run, replay
+from coneskin.runs.replay.run import Run, read_run
 from coneskin.skin.wire import FrameDecoder
 
 from .kind import FEW_FRAMES_TIME, FaultKind
@@ -47,7 +47,7 @@ def judge_recording(path: Path, fault_at: float, active_at: float, touched: bool
         yield f"the recording ends {fault_at - last:.3f} s before the fault"
     if missing := _missing_frames(run, active_at, fault_at):
         yield f"{missing} frames before the fault are not in the recording"
-    again = replay(run)
+    again = run.replay()
     if not again.agrees:
         yield f"its replay is another: {again.differences[:1]}"
 

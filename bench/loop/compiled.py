@@ -30,7 +30,7 @@ from coneskin.core.version import code_build
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Output
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from coneskin.skin.wire import FRAME_LENGTH
 
@@ -83,11 +83,11 @@ def measure(long: Path) -> dict[str, object]:
         "core, one input at a time": [1e6 * processor(one_by_one) / len(inputs)],
         "bare floor of an input: its checksum": [1e6 * processor(floor) / len(inputs)],
         "read the file, whole run": [processor(lambda: sum(1 for _ in read_run(long).blocks))],
-        "replay, whole run": [processor(lambda: replay(read_run(long)))],
+        "replay, whole run": [processor(lambda: read_run(long).replay())],
         **touches(),
     }
     digest = hashlib.sha256("\n".join(map(repr, outputs)).encode())
-    digest.update(json.dumps([event.details for event in replay(read_run(COLLISION)).events]).encode())
+    digest.update(json.dumps([event.details for event in read_run(COLLISION).replay().events]).encode())
     return {"build": code_build(), "figures": figures, "outputs": digest.hexdigest()}
 
 

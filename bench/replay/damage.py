@@ -17,7 +17,7 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.chunk import FILE_HEAD_SIZE, decode_body
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.scan import Chunk, walk
-from coneskin.runs.replay.run import Verdict, read_run, replay
+from coneskin.runs.replay.run import Verdict, read_run
 
 __all__ = ["damage", "kill"]
 
@@ -84,7 +84,7 @@ def _judge(hurt: bytes, data: bytes, whole: list[Chunk], folder: Path, again: bo
     path.write_bytes(hurt)
     try:
         recording = read_recording(path)
-        got = list(recording.blocks)
+        got = list(recording)
         if not recording.defects:
             yield "same"
         intact = [chunk for chunk in whole if data[chunk.offset : chunk.end] in hurt]
@@ -94,7 +94,7 @@ def _judge(hurt: bytes, data: bytes, whole: list[Chunk], folder: Path, again: bo
             yield "false" if set(got) - every else "lost"
         if again:
             run = read_run(path)
-            result = replay(run)
+            result = run.replay()
             yield "replayed"
             if result.verdict is Verdict.SAME:
                 yield "same"
@@ -173,7 +173,7 @@ def kill(path: Path, folder: Path, trials: int) -> Iterator[str]:
         first = next(iter(read_run(path).blocks)).time
         kept = max((block.time for block in run.blocks), default=first) - first
         lost.append(max(0.0, written - kept))
-        result = replay(run) if trial % _REPLAY_EVERY == 0 else None
+        result = run.replay() if trial % _REPLAY_EVERY == 0 else None
         seen.update(["not closed" if not run.complete else "CLOSED"])
         if result is not None:
             seen.update([str(result.verdict)])

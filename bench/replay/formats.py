@@ -20,10 +20,10 @@ _CAN_LENGTH = 64  # bytes of a frame of CAN FD
 
 def formats(path: Path, folder: Path) -> Iterator[str]:
     """Yield lines of a table; each format holds every block, and what is read back is compared."""
-    blocks = list(read_recording(path).blocks)
+    blocks = list(read_recording(path))
     length = blocks[-1].time - blocks[0].time
     rows: dict[str, tuple[str, Callable[[Path], None], Callable[[Path], list[Block]]]] = {
-        "coneskin recording": ("run.rec", lambda p: _write_ours(p, blocks), lambda p: list(read_recording(p).blocks)),
+        "coneskin recording": ("run.rec", lambda p: _write_ours(p, blocks), lambda p: list(read_recording(p))),
         "CSV, payload in hex": ("run.csv", lambda p: _write_csv(p, blocks), _read_csv),
         "npz, compressed": ("run.npz", lambda p: _write_npz(p, blocks), _read_npz),
         "MCAP, zstd chunks": ("run.mcap", lambda p: _write_mcap(p, blocks), _read_mcap),

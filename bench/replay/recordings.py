@@ -19,7 +19,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from bench.report import head
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 
 from .damage import damage, kill
 from .formats import formats
@@ -63,7 +63,7 @@ def speeds(path: Path, name: str) -> Iterator[str]:
     """Yield lines: how often faster than it happened a run is read and replayed, on one core and on two."""
     _once(str(path))  # it imports
     length, began = _once(str(path))
-    again, rate = replay(read_run(path)), length / began
+    again, rate = read_run(path).replay(), length / began
     yield f"\n{name}: {length:.1f} s, {again.verdict}"
     began = time.process_time()
     count = sum(1 for _ in read_run(path).blocks)
@@ -108,5 +108,5 @@ def _dask(path: Path) -> Iterator[str]:
 def _once(path: str) -> tuple[float, float]:
     """Return the duration of a run, and the processor's time for its replay [s]."""
     began = time.process_time()
-    result = replay(read_run(path))
+    result = read_run(path).replay()
     return result.duration, time.process_time() - began

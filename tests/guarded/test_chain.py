@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
@@ -106,7 +106,7 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
         assert controller.state()["q"] == pytest.approx(START, abs=1e-3)
     run = read_run(path)
     assert run.missing == ""
-    assert replay(run).same
+    assert run.replay().same
 
 
 @pytest.mark.promise("P42")
@@ -118,7 +118,7 @@ def test_the_guard_killed_the_driver_stops_the_arm(controller, tmp_path):
         thread.join(DEADLINE)
         assert isinstance(raised[0], RobotConnectionError)
         assert_stopped_on_the_way(controller)
-    assert replay(read_run(path)).agrees  # up to the last that it sent
+    assert read_run(path).replay().agrees  # up to the last that it sent
 
 
 @pytest.mark.promise("P39")

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import Collision, RobotRefused
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
@@ -53,7 +53,7 @@ def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, bo
         assert isinstance(raised[0], Collision)
         assert raised[0].u == pytest.approx(0.13, abs=1e-3)
         assert_stopped_on_the_way(controller)
-    assert replay(read_run(tmp_path / "run.rec")).same
+    assert read_run(tmp_path / "run.rec").replay().same
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from itertools import count
 import pytest
 
 from coneskin.core.errors import Collision, RobotRefused
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 from tests.support.sweep import sweep
@@ -166,7 +166,7 @@ def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run,
             with pytest.raises(Collision):
                 session.check()
         recorded = read_run(path)
-        assert replay(recorded).same
+        assert recorded.replay().same
         assert recorded.events[-1].name == "ending", recorded.events[-4:]  # its last word too is in the recording
         return recorded.events
 

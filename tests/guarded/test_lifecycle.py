@@ -12,7 +12,7 @@ import pytest
 
 from coneskin.core import child_process
 from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
 from coneskin.testing.scenes import GOAL, START
 
@@ -299,4 +299,4 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(controller, tmp_path):
         signal.signal(signal.SIGXFSZ, handler)
     run = read_run(path)
     assert run.missing
-    assert replay(run).agrees  # nothing is lost that was written before
+    assert run.replay().agrees  # nothing is lost that was written before

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
@@ -78,4 +78,4 @@ def test_the_arm_stops_and_goes_on_only_with_the_same_device_and_a_reset(tmp_pat
                 until(lambda: is_reset(session))
                 session.arm.move_j([stop[0] - 0.1, *stop[1:]], speed=0.5, acceleration=2.0)
                 assert controller.state()["q"][0] == pytest.approx(stop[0] - 0.1, abs=1e-3)
-    assert replay(read_run(tmp_path / "run.rec")).same
+    assert read_run(tmp_path / "run.rec").replay().same

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 
 from coneskin.core.errors import Collision
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 
@@ -39,7 +39,7 @@ def test_a_force_beside_the_skin_ends_the_retreat(tmp_path):
                 thread.join(DEADLINE)
         assert isinstance(raised[0], Collision)
         run = read_run(path)
-        assert replay(run).same
+        assert run.replay().same
         return run.events
 
     (over,) = (event.details for event in until_undisturbed(attempt) if event.name == "retreated")

@@ -11,7 +11,7 @@ from coneskin.core.version import running_version
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run
 from coneskin.runs.replay.event_details import Tolerances
-from coneskin.runs.replay.run import Run, read_run, replay
+from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.run_files import summarise_run
 
 
@@ -21,7 +21,7 @@ def test_a_cut_replays_to_the_same_contact_and_reaction(collision: Run, tmp_path
     assert (cut.contacts, cut.active) == (1, True)
     assert cut.comparison.differences == ()
     run = read_run(cut.path)
-    result = replay(run)
+    result = run.replay()
     assert result.same
     assert not run.missing
     names = [event.name for event in result.events]

@@ -256,7 +256,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     from coneskin.robot.sim.process import free_host
-    from coneskin.runs.replay.run import read_run, replay
+    from coneskin.runs.replay.run import read_run
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
     try:
@@ -284,7 +284,7 @@ def run(args: argparse.Namespace) -> int:
             raise RobotRefused(f"{cause}. What followed: {exc}") from exc
         raise
     recorded = read_run(folder)
-    again = replay(recorded)
+    again = recorded.replay()
     facts = _collision_facts(recorded, touched)
     facts["peak_n"], facts["clamp_n"] = (None, None) if force is None else (round(force.peak, 1), round(force.clamp, 1))
     facts["same_in_replay"] = again.same

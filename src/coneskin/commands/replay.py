@@ -90,10 +90,10 @@ def _list_runs(folder: Path) -> int:
 
 def _replay_one(args: argparse.Namespace) -> int:
     from coneskin.core.progress import ProgressBar
-    from coneskin.runs.replay.run import read_run, replay
+    from coneskin.runs.replay.run import read_run
 
     recorded = read_run(args.runs[0], ProgressBar("read"))
-    result = replay(recorded, progress=ProgressBar("replayed"))
+    result = recorded.replay(progress=ProgressBar("replayed"))
     if args.picture:
         from coneskin.runs.replay.run_picture import draw_run
 

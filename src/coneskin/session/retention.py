@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.defects import DefectKind
 from coneskin.core.recording.reader import MAX_SIZE, parts_of, read_recording
@@ -32,7 +33,7 @@ _ORDINARY_EVENTS = frozenset(
 )
 
 
-def prune_run(path: Path, around: float = AROUND, progress: Callable[[float], None] | None = None) -> tuple[int, int]:
+def prune_run(path: Path, around: float = AROUND, progress: Progress = silent) -> tuple[int, int]:
     """Drop what is far from any touch, stop or fault; a run that was pruned says so, and cannot be replayed as a whole.
 
     Args:

@@ -18,8 +18,8 @@ def agree(path: Path) -> bool:
     """Compare the blocks; return whether both call the recording whole."""
     blocks, broken = read(path)
     ours = read_recording(path)
-    assert [tuple(block) for block in ours.blocks] == blocks
-    assert bool(ours.defects) == bool(broken), (ours.missing, broken)
+    assert [tuple(block) for block in ours] == blocks
+    assert bool(ours.defects) == bool(broken), (ours.defects, broken)
     return not broken
 
 

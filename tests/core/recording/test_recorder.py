@@ -25,8 +25,8 @@ def test_what_is_written_is_read(tmp_path_factory: pytest.TempPathFactory, writt
     with Recorder(path) as recorder:
         recorder.write(*written)
     got = read_recording(path)
-    assert list(got.blocks) == written
-    assert got.missing == ""
+    assert list(got) == written
+    assert got.defects == ()
 
 
 def test_kill_9_loses_no_more_than_the_chunk_that_is_collected(tmp_path: Path) -> None:
@@ -43,9 +43,10 @@ def test_kill_9_loses_no_more_than_the_chunk_that_is_collected(tmp_path: Path) -
     done = subprocess.run([sys.executable, "-c", code, str(path)], timeout=60)
     assert done.returncode == -signal.SIGKILL
     got = read_recording(path)
-    assert [b.time for b in got.blocks] == [0.01 * i for i in range(98)]
+    assert [b.time for b in got] == [0.01 * i for i in range(98)]
     assert FLUSH_PERIOD >= 0.99 - 0.97
-    assert "was not closed: nothing is known after 0.970 s" in got.missing
+    (cut,) = got.defects
+    assert "was not closed: nothing is known after 0.970 s" in cut.describe()
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system to stand for a full disk")
@@ -84,13 +85,13 @@ def test_a_long_recording_goes_on_in_further_files(tmp_path: Path) -> None:
     assert len(recorder.parts) > 4
     assert max(part.stat().st_size for part in recorder.parts) < 13_000
     got = read_recording(tmp_path / "run.rec")
-    assert list(got.blocks) == written
+    assert list(got) == written
     assert got.defects == ()
     assert set(got.copies) == {written[0]}
     recorder.parts[2].unlink()
     torn = read_recording(tmp_path / "run.rec")
     assert [defect.kind for defect in torn.defects] == ["lost"]
-    kept = list(torn.blocks)
+    kept = list(torn)
     assert kept == [item for item in written if not torn.defects[0].since < item.time <= torn.defects[0].until]
     assert len(kept) < 60
     assert written[0] in read_recording(recorder.parts[3]).copies  # each file has what it takes to be looked at alone

@@ -43,7 +43,7 @@ def test_events_and_windows_stay_and_the_rest_is_said(tmp_path: Path) -> None:
     got = read_recording(tmp_path / "run.rec")
     assert {defect.kind for defect in got.defects} == {DefectKind.DROPPED}
     assert all("dropped on purpose" in defect.describe() for defect in got.defects)
-    left = list(got.blocks)
+    left = list(got)
     assert set(written) >= set(left) >= {b for b in written if b.kind in (20, EVENT) or 39.0 <= b.time <= 41.0}
     assert sum(defect.blocks for defect in got.defects) == len(written) - len(left)
     assert got.size < size / 20
@@ -51,7 +51,7 @@ def test_events_and_windows_stay_and_the_rest_is_said(tmp_path: Path) -> None:
     assert (tmp_path / "run.rec").stat().st_mode & 0o777 == 0o600
     prune(tmp_path / "run.rec", (39.0, 41.0))
     again = read_recording(tmp_path / "run.rec")
-    assert (list(again.blocks), again.defects) == (left, got.defects)
+    assert (list(again), again.defects) == (left, got.defects)
 
 
 def test_a_long_recording_is_shortened_while_it_goes_on(tmp_path: Path) -> None:
@@ -72,7 +72,7 @@ def test_a_long_recording_is_shortened_while_it_goes_on(tmp_path: Path) -> None:
     assert max(sizes[: len(steps) - 1]) < 3000 < 20_000 <= sizes[-2]
     got = read_recording(tmp_path / "run.rec")
     assert {defect.kind for defect in got.defects} == {DefectKind.DROPPED}
-    assert [block.time for block in got.blocks if block.kind == EVENT] == [20.0, 40.0, 60.0, 80.0]
+    assert [block.time for block in got if block.kind == EVENT] == [20.0, 40.0, 60.0, 80.0]
 
 
 def test_a_pruned_run_keeps_its_collision_and_is_not_called_the_same(
@@ -123,9 +123,9 @@ def test_a_recording_that_goes_on_is_not_pruned_and_loses_nothing(tmp_path: Path
         with pytest.raises(RecordingError, match="is being recorded now"):
             prune_run(path)
         recorder.write(*blocks[50:])
-    assert list(read_recording(path).blocks) == blocks
+    assert list(read_recording(path)) == blocks
     prune_run(path)
-    assert not list(read_recording(path).blocks)
+    assert not list(read_recording(path))
 
 
 def test_what_is_around_damage_stays_because_a_touch_may_be_in_it(tmp_path: Path) -> None:

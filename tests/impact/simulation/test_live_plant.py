@@ -17,7 +17,7 @@ import pytest
 from coneskin.core.channel import Channel, pair, wait_readable
 from coneskin.core.errors import Collision, MissingExtra, RobotRefused
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, body_places, contact_force
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
@@ -82,7 +82,7 @@ def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_pat
     located = next(e for e in events if e.name == EventName.CONTACT_LOCATED)
     assert located.details["u"] == pytest.approx(0.13, abs=0.01)
     run = read_run(tmp_path / "run.rec")
-    assert replay(run).same
+    assert run.replay().same
     (row,) = judge_run(tmp_path / "run.rec")
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
     truths = list(run.select(kinds=frozenset({BlockKind.TRUTH})))

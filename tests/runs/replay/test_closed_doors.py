@@ -46,7 +46,7 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> list[list[Block]]:
     for name, text in (("0.rec", FULL.replace('kind = "stop"', 'kind = "retreat"')), ("1.rec", FULL)):
         record(folder / name, text)
     demo = COLLISION
-    return [list(read_recording(path).blocks) for path in (folder / "0.rec", folder / "1.rec", demo)]
+    return [list(read_recording(path)) for path in (folder / "0.rec", folder / "1.rec", demo)]
 
 
 @pytest.mark.long
@@ -80,7 +80,7 @@ def test_nothing_that_a_header_names_is_opened(tmp_path: Path) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)
     (tmp_path / "canary.toml").write_text("radius1_mm = 54\nradius2_mm = 54\nheight_mm = 434\n")
     (tmp_path / "canary.stl").write_bytes(b"solid")
-    blocks = list(read_recording(tmp_path / "run.rec").blocks)
+    blocks = list(read_recording(tmp_path / "run.rec"))
     header = json.loads(blocks[0].payload)
     for name, old, new in (
         ("file", "[[link.sensor]]", f'[[link.sensor]]\nfile = "{tmp_path}/canary.toml"'),
@@ -130,7 +130,7 @@ def test_an_event_with_other_details_is_written_as_it_is() -> None:
 @pytest.mark.parametrize("details", [{}, {"since": "a", "until": 1.0}, {"since": 1.0, "until": None, "what": ""}])
 def test_a_gap_without_its_times_is_refused(tmp_path: Path, details: dict[str, object]) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)
-    blocks = list(read_recording(tmp_path / "run.rec").blocks)
+    blocks = list(read_recording(tmp_path / "run.rec"))
     write(tmp_path / "run.rec", [*blocks, GuardEvent(EventName.RECORDING_GAP, blocks[-1].time, details).block()])
     with pytest.raises(ConeSkinError, match=r"recording_gap of .* does not say from and until when"):
         read_run(tmp_path)
@@ -138,7 +138,7 @@ def test_a_gap_without_its_times_is_refused(tmp_path: Path, details: dict[str, o
 
 def test_a_time_that_is_none_is_refused_with_its_place(tmp_path: Path) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)
-    blocks = list(read_recording(tmp_path / "run.rec").blocks)
+    blocks = list(read_recording(tmp_path / "run.rec"))
     blocks[7] = blocks[7]._replace(time=float("nan"))
     write(tmp_path / "run.rec", blocks)
     with pytest.raises(

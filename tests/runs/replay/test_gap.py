@@ -7,7 +7,7 @@ from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
-from coneskin.runs.replay.run import Verdict, read_run, replay
+from coneskin.runs.replay.run import Verdict, read_run
 
 from ...scene.scenes import record
 
@@ -15,7 +15,7 @@ from ...scene.scenes import record
 def with_a_gap(whole, cut, since, until):
     """The recording as a guard makes it whose program takes nothing for a while."""
     spill, blocks = RecordingOverflowFilter(), []
-    for block in read_recording(whole).blocks:
+    for block in read_recording(whole):
         if block.kind == BlockKind.HEADER or not since <= block.time < until:
             blocks += [found for _, found in decode_blocks(spill.notice())]
             blocks.append(block)
@@ -34,7 +34,7 @@ def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, s
     assert [event.name for event in run.events if event.name != "recording_gap"] == [event.name for event in happened]
     assert f"are not recorded: the program did not read them, from {since - 1000.0:.2f}" in run.missing
     assert "to 0.99" in run.missing or "to 1.00" in run.missing
-    result = replay(run)
+    result = run.replay()
     assert result.verdict == Verdict.INCOMPLETE, result.differences
     assert result.compared == sum(event.time < since for event in happened)
     assert main(["replay", str(tmp_path / "cut.rec")]) == 4
@@ -44,11 +44,11 @@ def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, s
 def test_a_difference_before_the_gap_is_found(tmp_path):
     record(tmp_path / "whole.rec")
     with_a_gap(tmp_path / "whole.rec", tmp_path / "cut.rec", 1001.2, 1001.4)
-    blocks = list(read_recording(tmp_path / "cut.rec").blocks)
+    blocks = list(read_recording(tmp_path / "cut.rec"))
     with Recorder(tmp_path / "other.rec") as recorder:
         recorder.write(*(block for block in blocks if not (block.kind == BlockKind.ARM and block.time < 1000.4)))
-    assert replay(read_run(tmp_path / "other.rec")).differences
-    assert replay(read_run(tmp_path / "cut.rec")).agrees
+    assert read_run(tmp_path / "other.rec").replay().differences
+    assert read_run(tmp_path / "cut.rec").replay().agrees
 
 
 def test_a_whole_recording_lacks_nothing(tmp_path):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.runs.replay.run import read_run, replay
+from coneskin.runs.replay.run import read_run
 from tests.support.paths import COLLISION
 
 RUN = COLLISION
@@ -10,7 +10,7 @@ RUN = COLLISION
 
 @pytest.fixture(scope="module")
 def result():
-    return replay(read_run(RUN))
+    return read_run(RUN).replay()
 
 
 def test_the_same_happens_again(result):
@@ -47,6 +47,6 @@ def test_another_reaction_would_have_stood_still():
 
     run = read_run(RUN)
     only_stop = parse_scene(run.header["scene"].replace('kind = "retreat"', 'kind = "stop"'))
-    names = [event.name for event in replay(run, only_stop).events]
+    names = [event.name for event in run.replay(only_stop).events]
     assert "retreating" not in names
     assert "latched" in names

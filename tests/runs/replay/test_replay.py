@@ -18,7 +18,8 @@ from coneskin.core.version import code_versions, running_version
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.comparison import compare_decisions, comparison_lines
 from coneskin.runs.decisions import decide_again, recorded_decisions
-from coneskin.runs.replay.run import Run, Verdict, _event_differences, read_run, replay
+from coneskin.runs.replay.event_details import event_differences
+from coneskin.runs.replay.run import Run, Verdict, read_run
 from coneskin.scene.settings import resolved_settings
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.sweep import sweep
@@ -47,7 +48,7 @@ def test_the_run_is_a_collision(run: Run) -> None:
 
 
 def test_the_same_events_bit_by_bit(run: Run) -> None:
-    result = replay(run)
+    result = run.replay()
     assert result.same
     assert result.differences == []
     assert result.missing == ""
@@ -62,7 +63,7 @@ def test_one_bit_of_an_event_is_seen(run: Run) -> None:
     name, details = json.loads(blocks[where].payload)
     details["u"] *= 1.0 + 2.3e-16
     blocks[where] = GuardEvent(name, blocks[where].time, details).block()
-    result = replay(changed(run, blocks=tuple(blocks)))
+    result = changed(run, blocks=tuple(blocks)).replay()
     assert not result.same
     assert result.differences == ["0.6040 s, contact: u 69.905 mm, by -1.4e-14 mm"]
 
@@ -73,16 +74,16 @@ def test_a_recorded_event_more_or_less_is_seen(run: Run, removed: int) -> None:
     blocks = tuple(run.blocks)
     fewer = blocks[:where] + blocks[where + 1 :]
     more = blocks[: where + 1] + blocks[where:]
-    (line,) = replay(changed(run, blocks=fewer)).differences
+    (line,) = changed(run, blocks=fewer).replay().differences
     assert line.endswith(": is new")
-    (line,) = replay(changed(run, blocks=more)).differences
+    (line,) = changed(run, blocks=more).replay().differences
     assert line.endswith(": was recorded, and is not replayed")
 
 
 def test_events_that_are_recorded_but_not_replayed_are_seen_in_a_cut_run_too(run: Run) -> None:
     blocks = tuple(block for block in run.blocks if block.kind != BlockKind.SKIN)
     cut = Defect(DefectKind.NOT_CLOSED, since=max(block.time for block in blocks))
-    assert replay(changed(run, blocks=blocks, defects=(cut,))).differences
+    assert changed(run, blocks=blocks, defects=(cut,)).replay().differences
 
 
 @pytest.mark.long
@@ -96,7 +97,7 @@ def test_a_changed_byte_of_the_skin_is_no_accident(run: Run, data: st.DataObject
     payload = bytearray(blocks[where].payload)
     payload[data.draw(st.integers(0, len(payload) - 1))] ^= data.draw(st.integers(1, 255))
     blocks[where] = blocks[where]._replace(payload=bytes(payload))
-    result = replay(changed(run, blocks=tuple(blocks)))
+    result = changed(run, blocks=tuple(blocks)).replay()
     equal = [tuple(e) for e in map(_as_json, result.events)] == [tuple(e) for e in map(_as_json, run.events)]
     assert result.same == equal
     assert bool(result.differences) == (not equal)
@@ -112,7 +113,7 @@ def test_a_damaged_touch_is_not_the_same(run: Run) -> None:
     blocks = list(run.blocks)
     where = max(i for i, block in enumerate(blocks[:contact]) if block.kind == BlockKind.SKIN)
     blocks[where] = blocks[where]._replace(payload=bytes(len(blocks[where].payload)))
-    assert not replay(changed(run, blocks=tuple(blocks))).same
+    assert not changed(run, blocks=tuple(blocks)).replay().same
 
 
 @pytest.fixture(scope="module")
@@ -134,7 +135,7 @@ def test_a_run_that_is_cut_anywhere_replays_and_says_so(short: bytes, tmp_path: 
             seen.add("unreadable")
             said.add(str(exc))
             continue
-        result = replay(run)
+        result = run.replay()
         seen.add("replayed")
         assert "was not closed: nothing is known after" in result.missing, length
         assert result.verdict == Verdict.INCOMPLETE, (length, result.differences)
@@ -147,7 +148,7 @@ def test_another_scene_gives_other_events(run: Run) -> None:
     from coneskin.scene.reader import parse_scene
 
     deaf = parse_scene(FULL.replace("id = 2", "id = 2\ntouch_level = 0.99\nlocation_level = 0.999"))
-    result = replay(run, deaf)
+    result = run.replay(deaf)
     assert not result.same
     assert "contact" not in [event.name for event in result.events]
 
@@ -158,7 +159,7 @@ def test_a_guard_that_could_not_start_replays(tmp_path: Path, run: Run) -> None:
     with Recorder(path) as recorder:
         recorder.write(Block(BlockKind.HEADER, 0.0, json.dumps(run.header).encode()))
         recorder.write(GuardEvent("guard_exited", 0.0, {"what": "no port"}).block())
-    result = replay(read_run(tmp_path))
+    result = read_run(tmp_path).replay()
     assert result.verdict == Verdict.INCOMPLETE
     assert result.differences == []
     assert [event.name for event in result.recorded] == ["guard_exited"]
@@ -194,7 +195,7 @@ def test_no_run_at_all(tmp_path: Path) -> None:
 
 def test_a_replay_tells_how_far_it_is(run: Run) -> None:
     told: list[float] = []
-    assert replay(run, progress=told.append).same
+    assert run.replay(progress=told.append).same
     assert told == sorted(told)
     assert 0.0 < told[0] < told[-1] == 1.0
 
@@ -208,7 +209,7 @@ def test_other_code_and_other_filled_in_values_are_named_before_any_difference(r
     then = changed(run, header={**run.header, **mine})
     (line,) = then.other_code()
     assert re.fullmatch(r"the scene is filled in otherwise .*: monitoring\.settle 0\.125 -> 0\.\d+", line)
-    assert replay(then).other_code == (line,)
+    assert then.replay().other_code == (line,)
     comparison = compare_decisions(recorded_decisions(then), decide_again(then))
     assert comparison_lines(comparison)[1] == f"  {line}"
 
@@ -231,16 +232,16 @@ STANDING = GuardEvent(EventName.STANDSTILL, 102.0, {"speed": 0.001, "paths": ["d
 )
 def test_what_differs_is_told_with_its_unit(time: float, details: dict[str, Any], line: str) -> None:
     other = GuardEvent(EventName.STANDSTILL, time, {**STANDING.details, **details})
-    assert list(_event_differences([STANDING], [other], 100.0)) == [line]
+    assert list(event_differences([STANDING], [other], 100.0)) == [line]
 
 
 def test_an_event_without_a_partner_does_not_move_the_others() -> None:
     ended = GuardEvent(EventName.ENDING, 103.0, {"what": "the guard was told to end"})
     both = [STANDING, ended]
-    assert list(_event_differences(both, both, 100.0)) == []
-    (line,) = _event_differences([ended], both, 100.0)
+    assert list(event_differences(both, both, 100.0)) == []
+    (line,) = event_differences([ended], both, 100.0)
     assert line == "2.0000 s  standstill: 0.0010 rad/s, by the path driver: is new"
-    assert list(_event_differences([STANDING], [ended], 100.0)) == [
+    assert list(event_differences([STANDING], [ended], 100.0)) == [
         "2.0000 s  standstill: 0.0010 rad/s, by the path driver: "
         "replayed as 3.0000 s  ending: the guard was told to end"
     ]

@@ -18,6 +18,7 @@ from typing import NamedTuple, TypeGuard
 from coneskin.core.errors import RecordingError
 
 __all__ = [
+    "ALL_KINDS",
     "COPY",
     "DROPPED",
     "END",
@@ -34,6 +35,7 @@ __all__ = [
 END = 0  #: kind of the last block of a recording that was closed
 COPY = 255  #: kind: a block that stands elsewhere as well: u8 its kind, f64 its time, its payload
 DROPPED = 254  #: kind: JSON: what retention has dropped
+ALL_KINDS = frozenset(range(256))
 FILE_KINDS = frozenset({END, *range(240, 256)})  #: not for those who read a run
 _BLOCK_HEAD = struct.Struct("<IBd")
 _BLOCK_TAIL = struct.Struct("<I")

@@ -6,7 +6,6 @@ import struct
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from coneskin.core.errors import RecordingError
 
@@ -19,7 +18,6 @@ __all__ = [
     "MAX_BODY",
     "SYNC",
     "ChunkHead",
-    "FileHead",
     "bits",
     "decode_body",
     "decode_chunk_head",
@@ -39,18 +37,6 @@ MAX_BODY = 2 * MAX_PAYLOAD  #: bytes of a chunk's blocks before compression; mor
 _PLAIN, _ZLIB = 0, 1  # encodings of a body
 _ZLIB_LEVEL = 1  # of zlib: 3.1 times smaller in 2 to 4 ms for a second of an arm and a skin; 6 gains 8 % more
 _LAST_BIT = 63  # of ``ChunkHead.kinds``: this kind or one above it
-
-
-class FileHead(NamedTuple):
-    """Head of a file.
-
-    Attributes:
-        part: number of the file in its recording, from 0.
-        run: number of the recording, drawn by chance; each of its chunks has it.
-    """
-
-    part: int
-    run: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,20 +81,20 @@ def bits(kinds: Sequence[int] | frozenset[int]) -> int:
     return found
 
 
-def encode_file_head(head: FileHead) -> bytes:
-    """Return the first bytes of a file."""
-    data = _FILE_HEAD.pack(MAGIC, head.part, head.run, 0)[:-4]
+def encode_file_head(part: int, run: int) -> bytes:
+    """Return the first bytes of a file: its number in the recording, from 0, and the recording's, drawn by chance."""
+    data = _FILE_HEAD.pack(MAGIC, part, run, 0)[:-4]
     return data + struct.pack("<I", zlib.crc32(data))
 
 
-def decode_file_head(data: bytes) -> FileHead | None:
-    """Return the head that a file begins with; None where its checksum is wrong, or it is too short."""
+def decode_file_head(data: bytes) -> int | None:
+    """Return the number of the recording that a file's head names; None where it is damaged, or too short."""
     if len(data) < _FILE_HEAD.size:
         return None
-    magic, part, run, crc = _FILE_HEAD.unpack_from(data)
+    magic, _, run, crc = _FILE_HEAD.unpack_from(data)
     if magic != MAGIC or zlib.crc32(data[: _FILE_HEAD.size - 4]) != crc:
         return None
-    return FileHead(part, run)
+    return int(run)
 
 
 def encode_chunk(run: int, sequence: int, blocks: Sequence[Block], span: int = 1) -> bytes:

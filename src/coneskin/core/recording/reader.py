@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,28 +12,34 @@ from typing import BinaryIO
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
+from coneskin.core.progress import Progress, silent
 
-from .block import COPY, DROPPED, FILE_KINDS, Block, decode_copy
+from .block import ALL_KINDS, COPY, DROPPED, FILE_KINDS, Block, decode_copy
 from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head
 from .defects import Defect, decode_drop, find_defects
-from .scan import Chunk, Damage, Extent, holds_chunk, scan_extents, walk
+from .scan import Chunk, Damage, Extent, holds_chunk, walk
 
-__all__ = ["MAX_SIZE", "RecordedBlocks", "Recording", "parts_of", "read_recording"]
+__all__ = ["MAX_SIZE", "Recording", "parts_of", "read_recording"]
 
 MAX_SIZE = 1 << 36  #: bytes of a file: two years of one sensor and an arm; it is never held in memory
-_ALL_KINDS = (1 << 64) - 1
 
 
 @dataclass(frozen=True, slots=True)
-class RecordedBlocks:
-    """Blocks of a recording, read from its files anew at each iteration; they are never all in memory.
+class Recording:
+    """The readable part of a recording. Its blocks are read from its files at each iteration, never all into memory.
 
     Attributes:
-        extents: where they are, in the order in which they were written.
-        hidden: kinds that are not shown.
+        extents: where the intact blocks are, in the order in which they were written.
+        copies: blocks without which nothing can be replayed, from a place where they stand again.
+        defects: what is missing or wrong; empty where the recording is whole and was closed.
+        size: of its files [bytes].
+        hidden: kinds of block that are not shown.
     """
 
     extents: tuple[Extent, ...]
+    copies: tuple[Block, ...] = ()
+    defects: tuple[Defect, ...] = ()
+    size: int = 0
     hidden: frozenset[int] = FILE_KINDS
 
     @property
@@ -51,36 +57,25 @@ class RecordedBlocks:
         return self.select()
 
     def select(
-        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] | None = None
+        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] = ALL_KINDS
     ) -> Iterator[Block]:
         """Yield some of the blocks; what is outside is passed over without being read, as far as it can be.
 
         Args:
             since: the smallest time [s, host clock].
             until: the largest.
-            kinds: of block; None for all.
+            kinds: of block.
 
         Raises:
             RecordingError: a file has changed since it was opened, or cannot be read.
         """
-        hidden = self.hidden
-        if kinds is None and math.isinf(since) and math.isinf(until):
-            for chunk in self.chunks():
-                for block in decode_body(chunk.head, chunk.stored):
-                    if block.kind not in hidden:
-                        yield block
-            return
-        for block in self._raw(since, until, _ALL_KINDS if kinds is None else bits(kinds)):
-            kind = block.kind
-            if kind not in hidden and (kinds is None or kind in kinds) and since <= block.time <= until:
-                yield block
+        shown = kinds - self.hidden
+        for chunk in self._chunks(since, until, bits(shown)):
+            for block in decode_body(chunk.head, chunk.stored):
+                if block.kind in shown and since <= block.time <= until:
+                    yield block
 
-    def own(self) -> Iterator[Block]:
-        """Yield the blocks that the file has for itself: copies and notes of retention."""
-        kinds = frozenset({COPY, DROPPED})
-        return (block for block in self._raw(-math.inf, math.inf, bits(kinds)) if block.kind in kinds)
-
-    def chunks(self, since: float = -math.inf, until: float = math.inf, kinds: int = _ALL_KINDS) -> Iterator[Chunk]:
+    def _chunks(self, since: float, until: float, kinds: int) -> Iterator[Chunk]:
         """Yield the intact chunks with blocks in a time [s, host clock] and of kinds, each once, in order."""
         following = 0
         with ExitStack() as stack:
@@ -101,46 +96,6 @@ class RecordedBlocks:
                         if head.since <= until and head.until >= since and head.kinds & kinds:
                             yield chunk
 
-    def _raw(self, since: float, until: float, kinds: int) -> Iterator[Block]:
-        for chunk in self.chunks(since, until, kinds):
-            yield from decode_body(chunk.head, chunk.stored)
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """The readable part of a recording.
-
-    Attributes:
-        path: its first file.
-        run: number of the recording.
-        blocks: the intact blocks, in the order in which they were written; to be iterated over as often as one likes.
-        copies: blocks without which nothing can be replayed, from a place where they stand again.
-        defects: what is missing or wrong; empty where the recording is whole and was closed.
-        size: of its files [bytes].
-        since: the smallest time [s, host clock]; inf where nothing is left.
-        until: the largest; -inf where nothing is left.
-    """
-
-    path: Path
-    run: int
-    blocks: RecordedBlocks
-    copies: tuple[Block, ...]
-    defects: tuple[Defect, ...]
-    size: int
-    since: float
-    until: float
-
-    def select(
-        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] | None = None
-    ) -> Iterator[Block]:
-        """Yield some of the blocks; arguments as of ``RecordedBlocks.select``."""
-        return self.blocks.select(since, until, kinds)
-
-    @property
-    def missing(self) -> str:
-        """The defects in a sentence; empty where there are none."""
-        return "; ".join(defect.describe(0.0 if math.isinf(self.since) else self.since) for defect in self.defects)
-
 
 def parts_of(path: Path) -> list[Path]:
     """Return the files of a recording in their order: ``run.rec``, ``run.0001.rec``, ``run.0002.rec`` ..."""
@@ -149,7 +104,7 @@ def parts_of(path: Path) -> list[Path]:
     return [path, *sorted(numbered, key=lambda part: (len(part.name), part.name))]
 
 
-def read_recording(path: Path, progress: Callable[[float], None] | None = None) -> Recording:
+def read_recording(path: Path, progress: Progress = silent) -> Recording:
     """Read a recording, whole or torn, with all of its files.
 
     Args:
@@ -172,32 +127,26 @@ def read_recording(path: Path, progress: Callable[[float], None] | None = None) 
             known = decode_file_head(head)
             if known is None and len(paths) == 1 and not head.startswith(MAGIC) and not holds_chunk(file):
                 _refuse(part, head)
-            tell = None if progress is None else (lambda at, base=done: progress((base + at) / total))
-            found, damaged = scan_extents(part, file, size, tell)
-        if known is None:
-            if not found:
-                _refuse(part, head)
-            damages.append((part, len(extents), Damage(0, FILE_HEAD_SIZE, None)))
-        elif run is None:
-            run = known.run
-        at = 0
-        for damage in damaged:
-            while at < len(found) and found[at].offset < damage.offset:
-                at += 1
-            damages.append((part, len(extents) + at, damage))
-        extents += found
+            before = len(extents)
+            if known is None:
+                damages.append((part, before, Damage(0, FILE_HEAD_SIZE, None)))
+            for piece in walk(file, FILE_HEAD_SIZE, size):
+                if isinstance(piece, Damage):
+                    damages.append((part, len(extents), piece))
+                elif len(extents) == before or not extents[-1].takes(piece):
+                    extents.append(Extent.of(part, piece))
+                    progress((done + piece.offset) / total)
+        if known is None and len(extents) == before:
+            _refuse(part, head)
+        run = known if run is None else run
         done += size
-    if progress is not None:
-        progress(1.0)
-    if run is None:
-        run = extents[0].run
-    own, defects = find_defects(extents, damages, run)
-    stream = RecordedBlocks(own)
-    notes = list(stream.own())
-    dropped = tuple(decode_drop(block) for block in notes if block.kind == DROPPED)
+    progress(1.0)
+    own, defects = find_defects(extents, damages, extents[0].run if run is None else run)
+    notes = list(Recording(own, hidden=frozenset()).select(kinds=frozenset({COPY, DROPPED})))
+    dropped = (decode_drop(block) for block in notes if block.kind == DROPPED)
     copies = tuple(decode_copy(block) for block in notes if block.kind == COPY)
     every = tuple(sorted((*defects, *dropped), key=lambda defect: defect.since))
-    return Recording(path, run, stream, copies, every, sum(sizes), stream.since, stream.until)
+    return Recording(own, copies, every, sum(sizes))
 
 
 def _open(path: Path) -> BinaryIO:

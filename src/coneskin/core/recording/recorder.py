@@ -18,7 +18,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
 
 from .block import END, Block, encode_copy
-from .chunk import FileHead, encode_chunk, encode_file_head
+from .chunk import encode_chunk, encode_file_head
 
 __all__ = ["FLUSH_PERIOD", "Recorder", "hold_against_recorder", "part_path"]
 
@@ -159,7 +159,7 @@ class Recorder:
             path.unlink()
             raise
         self._file, self._written = file, 0
-        self._hand_over(encode_file_head(FileHead(len(self.parts), self._run)))
+        self._hand_over(encode_file_head(len(self.parts), self._run))
         self.parts.append(path)
         if len(self.parts) > 1 and self._copies:
             self._append(self._copied_again())

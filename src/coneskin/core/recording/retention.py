@@ -44,7 +44,7 @@ def prune_file(path: Path, windows: Sequence[tuple[float, float]], kept: frozens
                 raise RecordingError(f"{path} cannot be pruned: its head is damaged")
             with open(draft, "wb", opener=lambda name, flags: os.open(name, flags, 0o600)) as target:
                 target.write(head)
-                yield from _copy(file, size, target, known.run, windows, kept | FILE_KINDS)
+                yield from _copy(file, size, target, known, windows, kept | FILE_KINDS)
     except OSError as exc:
         raise RecordingError(f"cannot prune {path}: {exc.strerror or exc}") from exc
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from .chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, decode_chunk_head
+from .chunk import CHUNK_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, decode_chunk_head
 
-__all__ = ["Chunk", "Damage", "Extent", "holds_chunk", "scan_extents", "walk"]
+__all__ = ["Chunk", "Damage", "Extent", "holds_chunk", "walk"]
 
 _SEARCH_WINDOW = 1 << 18  # bytes that are searched at once
 _SEARCH_LENGTH = MAX_BODY + CHUNK_HEAD_SIZE + _SEARCH_WINDOW  # bytes within which one of the first two chunks begins
@@ -67,6 +67,13 @@ class Extent:
     since: float
     until: float
     last_kinds: int
+
+    @classmethod
+    def of(cls, path: Path, chunk: Chunk) -> Extent:
+        """Return the extent of one chunk of a file."""
+        head = chunk.head
+        content = head.blocks, head.kinds, head.since, head.until, head.kinds
+        return cls(path, chunk.offset, chunk.end, head.run, head.sequence, head.following, *content)
 
     def takes(self, chunk: Chunk) -> bool:
         """Take a chunk that follows; False where it does not, or the extent is long enough."""
@@ -128,28 +135,3 @@ def _find(file: BinaryIO, at: int, size: int) -> int:
 def holds_chunk(file: BinaryIO) -> bool:
     """Tell whether a chunk begins at the start of a file, or where the largest body there would have ended."""
     return _find(file, 0, _SEARCH_LENGTH) < _SEARCH_LENGTH
-
-
-def scan_extents(
-    path: Path, file: BinaryIO, size: int, progress: Callable[[int], None] | None = None
-) -> tuple[list[Extent], list[Damage]]:
-    """Return the extents of a file, in its order, and what is damaged.
-
-    Args:
-        path: of the file.
-        file: open for reading.
-        size: of the file [bytes].
-        progress: called now and then with the bytes that are read.
-    """
-    extents: list[Extent] = []
-    damages: list[Damage] = []
-    for piece in walk(file, FILE_HEAD_SIZE, size):
-        if isinstance(piece, Damage):
-            damages.append(piece)
-        elif not (extents and extents[-1].takes(piece)):
-            head = piece.head
-            content = head.blocks, head.kinds, head.since, head.until, head.kinds
-            extents.append(Extent(path, piece.offset, piece.end, head.run, head.sequence, head.following, *content))
-            if progress is not None:
-                progress(piece.offset)
-    return extents, damages

@@ -24,7 +24,7 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
 from coneskin.skin.detection.frame.reading import read
 
-from .tables import arm_states, skin_frames, slider_positions, wall_clock
+from .tables import wall_clock
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.values import ControllerState
@@ -168,11 +168,10 @@ def _streams(run: Run, progress: Progress) -> list[Iterable[_Message]]:
     logs = [_Message("/events", "foxglove.Log", event.time, _log(event, run, unix)) for event in events]
     streams: list[Iterable[_Message]] = [logs, _levels(run, progress)]
     streams.append(
-        _Message("/slider", "coneskin.SpeedSlider", time, {"fraction": fraction})
-        for time, fraction in slider_positions(run)
+        _Message("/slider", "coneskin.SpeedSlider", time, {"fraction": fraction}) for time, fraction in run.slider()
     )
     streams.append(_commands(run))
-    streams.append(_Message("/arm", "coneskin.ArmState", state.time, _joints(state)) for state in arm_states(run))
+    streams.append(_Message("/arm", "coneskin.ArmState", state.time, _joints(state)) for state in run.states())
     if run.scene().arm is not None:
         streams += [_drawn_arm(run, unix), _drawn_contacts(run, events, unix)]
     return streams
@@ -180,7 +179,7 @@ def _streams(run: Run, progress: Progress) -> list[Iterable[_Message]]:
 
 def _levels(run: Run, progress: Progress) -> Iterator[_Message]:
     sensors = {(item.sensor.device_id, item.sensor.sensor_id): item.sensor for item in run.scene().sensors}
-    for time, frame in skin_frames(run, progress):
+    for time, frame in run.frames(progress):
         if (sensor := sensors.get((frame.device, frame.sensor))) is not None:
             value = {"sensor": sensor.name, "level": read(sensor, frame).level, "clock_us": frame.clock_us}
             yield _Message(f"/skin/{frame.device}_{frame.sensor}", "coneskin.TouchLevel", time, value)
@@ -220,7 +219,7 @@ def _drawn_arm(run: Run, unix: float) -> Iterator[_Message]:
     assert scene.arm is not None
     arm, placed = arm_model(scene.arm.model), run.place_sensors()
     due = -math.inf
-    for state in arm_states(run):
+    for state in run.states():
         if state.time >= due:
             due = state.time + _DRAWN_EVERY
             lines = [_line([*skeleton(arm, state.q)], (0.4, 0.45, 0.5), 0.05)]
@@ -241,7 +240,7 @@ def _drawn_contacts(run: Run, events: Sequence[GuardEvent], unix: float) -> Iter
         touched = by_name.get(str(event.details.get("sensor")))
         if event.name not in _CONTACT_EVENTS or touched is None:
             continue
-        near = arm_states(run, event.time - _STATE_WINDOW, event.time + _STATE_WINDOW)
+        near = run.states(event.time - _STATE_WINDOW, event.time + _STATE_WINDOW)
         state = min(near, key=lambda one: abs(one.time - event.time), default=None)
         if state is None:
             continue

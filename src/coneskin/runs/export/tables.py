@@ -8,31 +8,22 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import RobotConnectionError
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
-from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
 from coneskin.runs.replay.event_details import QUANTITIES
-from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame, FrameDecoder
+from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame
 
 if TYPE_CHECKING:
-    from coneskin.robot.driver.values import ControllerState
     from coneskin.runs.replay.run import Run
 
 __all__ = [
     "Pieces",
     "Table",
-    "arm_states",
-    "run_tables",
-    "skin_frames",
-    "slider_positions",
     "table_pieces",
     "wall_clock",
 ]
@@ -45,8 +36,8 @@ _PIECE_ROWS = 1 << 14  # rows
 _IDENTIFIER_FIELDS = frozenset({"length", "device", "sensor", "status", "clock_us", "sequence"})  # the rest are counts
 
 
-def run_tables(run: Run, progress: Progress = silent) -> dict[str, Table]:
-    """Return the tables of a run by their names, all in memory; one without rows is left out.
+def table_pieces(run: Run, progress: Progress = silent) -> dict[str, Pieces]:
+    """Return the tables of a run by their names, in pieces that are read one after the other.
 
     Args:
         run: the run.
@@ -55,25 +46,12 @@ def run_tables(run: Run, progress: Progress = silent) -> dict[str, Table]:
     Raises:
         SceneError: this version of coneskin cannot read the scene.
     """
-    tables: dict[str, Table] = {}
-    for name, pieces in table_pieces(run, progress).items():
-        whole: dict[str, list[Any]] = {}
-        for piece in pieces():
-            for column, values in piece.items():
-                whole.setdefault(column, []).extend(values)
-        if whole:
-            tables[name] = whole
-    return tables
-
-
-def table_pieces(run: Run, progress: Progress = silent) -> dict[str, Pieces]:
-    """Return the tables of a run by their names, in pieces that are read one after the other; arguments as above."""
     start = run.start
     return {
         "events": lambda: _events(run, start),
         "frames": lambda: _frames(run, start, progress),
         "arm": lambda: _arm(run, start),
-        "slider": lambda: _pieces(("time_s", "fraction"), ((t - start, f) for t, f in slider_positions(run))),
+        "slider": lambda: _pieces(("time_s", "fraction"), ((t - start, f) for t, f in run.slider())),
         "commands": lambda: _commands(run, start),
     }
 
@@ -90,36 +68,6 @@ def wall_clock(run: Run) -> float:
     clocks = run.header["clocks"]
     unix = clocks.get("unix")
     return unix - clocks["monotonic"] if is_time(unix) else 0.0
-
-
-def skin_frames(run: Run, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
-    """Yield the frames of the skin, each with the host time at which its last byte was read [s]."""
-    decoder = FrameDecoder()
-    for block in run.select(kinds=frozenset({BlockKind.SKIN}), progress=progress):
-        for frame in decoder.feed(block.payload):
-            yield block.time, frame
-
-
-def arm_states(run: Run, since: float = -math.inf, until: float = math.inf) -> Iterator[ControllerState]:
-    """Yield the states of the arm in a time [s, host clock]; what the guard could not read either is left out."""
-    arm = run.scene().arm
-    if arm is None:
-        return
-    driver = load_driver(arm_model(arm.model).family)
-    for block in run.select(since, until, kinds=frozenset({BlockKind.ARM})):
-        with suppress(RobotConnectionError):
-            yield driver.decode_state(block.time, block.payload)
-
-
-def slider_positions(run: Run) -> Iterator[tuple[float, float]]:
-    """Yield host times [s] and the positions of the speed slider, from 0 to 1; what cannot be read is left out."""
-    arm = run.scene().arm
-    if arm is None:
-        return
-    driver = load_driver(arm_model(arm.model).family)
-    for block in run.select(kinds=frozenset({BlockKind.SLIDER})):
-        with suppress(RobotConnectionError):
-            yield block.time, driver.decode_speed_fraction(block.payload)
 
 
 def _events(run: Run, start: float) -> Iterator[Table]:
@@ -166,8 +114,7 @@ def _frames(run: Run, start: float, progress: Progress) -> Iterator[Table]:
         driven = (None,) * len(DrivenPotentials._fields)
         names += [f"driven_{name}_counts" for name in DrivenPotentials._fields]
     rows = (
-        (time - start, *frame[:-1], *(frame.driven or driven if driven else ()))
-        for time, frame in skin_frames(run, progress)
+        (time - start, *frame[:-1], *(frame.driven or driven if driven else ())) for time, frame in run.frames(progress)
     )
     return _pieces(("time_s", *names), rows)
 
@@ -183,7 +130,7 @@ def _arm(run: Run, start: float) -> Iterator[Table]:
             *(*(state.current or unknown), *(state.target_current or unknown)),
             *(state.powered, state.stopped_by_safety, state.program_running),
         )
-        for state in arm_states(run)
+        for state in run.states()
     )
     return _pieces(("time_s", "controller_time_s", *names, *flags), rows)
 

@@ -5,21 +5,20 @@ The same bytes through the same guard must give the same events, bit by bit. Dif
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from difflib import SequenceMatcher
 from enum import StrEnum
-from itertools import islice, zip_longest
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.errors import RecordingError
+from coneskin.core.errors import RecordingError, RobotConnectionError
 from coneskin.core.progress import Progress, silent
-from coneskin.core.recording.block import Block, is_time
+from coneskin.core.recording.block import ALL_KINDS, Block, is_time
 from coneskin.core.recording.defects import Defect, DefectKind
-from coneskin.core.recording.reader import RecordedBlocks, read_recording
+from coneskin.core.recording.reader import Recording, read_recording
 from coneskin.core.text import read_json
 from coneskin.core.version import recorded_version, running_version
 from coneskin.robot.guard.signals.event_text import describe
@@ -34,50 +33,17 @@ from coneskin.robot.guard.signals.journal import (
 )
 from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.detection.events import TouchBegan, TouchEnded
+from coneskin.skin.wire import Frame, FrameDecoder
 
-from .event_details import EXACT, describe_differences, milliseconds
+from .event_details import event_differences
 
 if TYPE_CHECKING:
+    from coneskin.robot.driver.protocol import ArmDriver
+    from coneskin.robot.driver.values import ControllerState
     from coneskin.robot.guard.core import GuardCore
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_run", "replay"]
-
-
-def _event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:
-    """Yield a line for each event that is not the same, bit by bit, or has no partner.
-
-    Args:
-        recorded: events of the recording.
-        replayed: of the replay, in the same order.
-        start: host time that counts as 0 [s].
-    """
-    bits = [_bits(event) for event in recorded], [_bits(event) for event in replayed]
-    if bits[0] == bits[1]:
-        return
-    for same, i, end, j, other_end in SequenceMatcher(None, *bits, autojunk=False).get_opcodes():
-        if same != "equal":
-            for old, new in zip_longest(recorded[i:end], replayed[j:other_end]):
-                yield _describe(old, new, start)
-
-
-def _bits(event: GuardEvent) -> tuple[str, str, str]:
-    """Return an event as text with every bit of its floats."""
-    return event.time.hex(), event.name, json.dumps(event.details)
-
-
-def _describe(old: GuardEvent | None, new: GuardEvent | None, start: float) -> str:
-    if old is None or new is None:
-        event, word = (old, "was recorded, and is not replayed") if new is None else (new, "is new")
-        assert event is not None
-        return f"{describe(event, start).strip()}: {word}"
-    if old.name != new.name:
-        return f"{describe(old, start).strip()}: replayed as {describe(new, start).strip()}"
-    words = describe_differences(old.details, new.details, EXACT, all_of_them=True)
-    if new.time != old.time:
-        words.append(f"{milliseconds(abs(new.time - old.time))} {'later' if new.time > old.time else 'earlier'}")
-    said = "; ".join(words) or "other words for the same"  # the order of its details
-    return f"{old.time - start:.4f} s, {old.name}: {said}"
+__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_run"]
 
 
 MOST_DIFFERENCES = 5  #: that a replay describes
@@ -205,14 +171,14 @@ class Run:
         if first is None:
             return self.start, self.start
         blocks = self.blocks
-        until = blocks.until if isinstance(blocks, RecordedBlocks) else max(block.time for block in blocks)
+        until = blocks.until if isinstance(blocks, Recording) else max(block.time for block in blocks)
         return first.time, until
 
     def select(
         self,
         since: float = -math.inf,
         until: float = math.inf,
-        kinds: frozenset[int] | None = None,
+        kinds: frozenset[int] = ALL_KINDS,
         progress: Progress = silent,
     ) -> Iterator[Block]:
         """Yield blocks of a time and of kinds; what is outside is not read from the file, as far as it can be.
@@ -220,12 +186,12 @@ class Run:
         Args:
             since: the smallest time [s, host clock].
             until: the largest.
-            kinds: of block, see ``BlockKind``; None for all.
+            kinds: of block, see ``BlockKind``.
             progress: called now and then with the fraction of a run in a file that is done.
         """
-        if not isinstance(self.blocks, RecordedBlocks):
+        if not isinstance(self.blocks, Recording):
             for block in self.blocks:
-                if since <= block.time <= until and (kinds is None or block.kind in kinds):
+                if since <= block.time <= until and block.kind in kinds:
                     yield block
             return
         begin = self.blocks.since
@@ -237,6 +203,34 @@ class Run:
                 progress(min((block.time - begin) / duration, 1.0))
             yield block
         progress(1.0)
+
+    def frames(self, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
+        """Yield the frames of the skin, each with the host time at which its last byte was read [s]."""
+        decoder = FrameDecoder()
+        for block in self.select(kinds=frozenset({BlockKind.SKIN}), progress=progress):
+            for frame in decoder.feed(block.payload):
+                yield block.time, frame
+
+    def states(self, since: float = -math.inf, until: float = math.inf) -> Iterator[ControllerState]:
+        """Yield the states of the arm in a time [s, host clock]; what the guard could not read either is left out."""
+        if (driver := self._driver()) is not None:
+            for block in self.select(since, until, frozenset({BlockKind.ARM})):
+                with suppress(RobotConnectionError):
+                    yield driver.decode_state(block.time, block.payload)
+
+    def slider(self) -> Iterator[tuple[float, float]]:
+        """Yield host times [s] and positions of the speed slider, from 0 to 1; what cannot be read is left out."""
+        if (driver := self._driver()) is not None:
+            for block in self.select(kinds=frozenset({BlockKind.SLIDER})):
+                with suppress(RobotConnectionError):
+                    yield block.time, driver.decode_speed_fraction(block.payload)
+
+    def _driver(self) -> ArmDriver | None:
+        from coneskin.robot.arm.ur_models import arm_model
+        from coneskin.robot.driver.registry import load_driver
+
+        arm = self.scene().arm
+        return None if arm is None else load_driver(arm_model(arm.model).family)
 
     def scene(self, settings: Mapping[str, Any] | None = None) -> Scene:
         """Return the scene of the run. No file that it names is looked for or opened.
@@ -360,9 +354,31 @@ class Run:
                     lasting[name] = lasting[name]._replace(peak=reading.level)
         return sorted([*over, *lasting.values()], key=lambda touch: touch.began)
 
-    def replay(self, scene: Scene | None = None) -> Replay:
-        """Run the recording again through today's guard; arguments and errors as of ``replay``."""
-        return replay(self, scene)
+    def replay(self, scene: Scene | None = None, progress: Progress = silent) -> Replay:
+        """Feed the inputs of the run to a new guard, and compare its events with the recorded ones.
+
+        Args:
+            scene: another scene than the run's own, to see what it would have done.
+            progress: called now and then with the fraction of a run in a file that is done.
+
+        Raises:
+            SceneError: the scene cannot be read or built.
+            RecordingError: a block holds what no guard records.
+        """
+        events: list[GuardEvent] = []
+        frames = 0
+        for block, outputs in self.decide(self.build_core(scene), progress):
+            if outputs:
+                events += [output for output in outputs if isinstance(output, GuardEvent)]
+            if block.kind == BlockKind.SKIN:
+                frames += len(block.payload)
+        gap, recorded = self.gap, self.events
+        then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
+        # an input is recorded before its events, so a run that was cut off may lack the last of these
+        again = events if gap == math.inf else events[: len(then)]
+        differences = list(islice(event_differences(then, again, self.start), MOST_DIFFERENCES))
+        since, until = self.span
+        return Replay(events, recorded, len(then), differences, frames, until - since, self.missing, self.other_code())
 
     def timeline(self, events: Sequence[GuardEvent] | None = None) -> list[str]:
         """Return a line of text for each event, with its time since the start of the run.
@@ -370,7 +386,6 @@ class Run:
         Args:
             events: those of a replay; by default the recorded ones.
         """
-        from coneskin.robot.guard.signals.event_text import describe
 
         return [describe(event, self.start) for event in (self.events if events is None else events)]
 
@@ -391,7 +406,7 @@ def read_run(path: Path | str, progress: Progress = silent) -> Run:
             raise RecordingError(f"{path} is a folder of {len(runs)} runs: name one of them, such as {runs[-1].parent}")
         path = path / "run.rec"
     recording = read_recording(path, progress)
-    first = next(iter(recording.blocks), None)
+    first = next(iter(recording), None)
     if first is None or first.kind != BlockKind.HEADER:
         first = next((block for block in recording.copies if block.kind == BlockKind.HEADER), None)
     if first is None:
@@ -405,37 +420,9 @@ def read_run(path: Path | str, progress: Progress = silent) -> Run:
         Commissioning.from_message(header.get("commissioning"))
     except (ValueError, TypeError, KeyError) as exc:
         raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
-    blocks = replace(recording.blocks, hidden=recording.blocks.hidden | {BlockKind.HEADER})
+    blocks = replace(recording, hidden=recording.hidden | {BlockKind.HEADER})
     run = Run(header, blocks, recording.defects, recording.copies)
     return replace(run, defects=tuple(sorted((*_left_out(run.events), *run.defects), key=lambda found: found.since)))
-
-
-def replay(run: Run, scene: Scene | None = None, progress: Progress = silent) -> Replay:
-    """Feed the run's inputs to a new guard.
-
-    Args:
-        run: the recorded run.
-        scene: another scene than the run's own, to see what it would have done.
-        progress: called now and then with the fraction of a run in a file that is done.
-
-    Raises:
-        SceneError: the scene cannot be read or built.
-        RecordingError: a block holds what no guard records.
-    """
-    events: list[GuardEvent] = []
-    frames = 0
-    for block, outputs in run.decide(run.build_core(scene), progress):
-        if outputs:
-            events += [output for output in outputs if isinstance(output, GuardEvent)]
-        if block.kind == BlockKind.SKIN:
-            frames += len(block.payload)
-    gap, recorded = run.gap, run.events
-    then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
-    # an input is recorded before its events, so a run that was cut off may lack the last of these
-    again = events if gap == math.inf else events[: len(then)]
-    differences = list(islice(_event_differences(then, again, run.start), MOST_DIFFERENCES))
-    since, until = run.span
-    return Replay(events, recorded, len(then), differences, frames, until - since, run.missing, run.other_code())
 
 
 def _kind_name(kind: int) -> str:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import RecordingError, RobotConnectionError
+from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
 from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.driver.values import ControllerState
-from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, stopping_contact
+from coneskin.robot.guard.signals.journal import GuardEvent, stopping_contact
 from coneskin.scene.values.scene import Scene
 
 from .run import Run
@@ -45,7 +43,7 @@ def _compose(run: Run) -> Figure:
     from matplotlib.figure import Figure
 
     scene = run.scene()
-    states, slider = _measured(run, scene)
+    states, slider = list(run.states()), list(run.slider())
     contact = _first(run.events, "contact")
     stopping = _first(run.events, "stopping")
     origin = next((event for event in (contact, stopping) if event is not None), None)
@@ -115,22 +113,6 @@ def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float, wind
     axes.grid(alpha=0.3)
 
 
-def _measured(run: Run, scene: Scene) -> tuple[list[ControllerState], list[tuple[float, float]]]:
-    """Return the states of the arm, and time and position of its speed slider."""
-    if scene.arm is None:
-        return [], []
-    driver = load_driver(arm_model(scene.arm.model).family)
-    states: list[ControllerState] = []
-    slider: list[tuple[float, float]] = []
-    for block in run.select(kinds=frozenset({BlockKind.ARM})):
-        with suppress(RobotConnectionError):  # what the guard could not read either, and has reported
-            states.append(driver.decode_state(block.time, block.payload))
-    for block in run.select(kinds=frozenset({BlockKind.SLIDER})):
-        with suppress(RobotConnectionError):
-            slider.append((block.time, driver.decode_speed_fraction(block.payload)))
-    return states, slider
-
-
 def _draw_speeds(
     axes: Any,
     states: list[ControllerState],
@@ -168,18 +150,15 @@ def _draw_speeds(
 
 def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[float, float]) -> None:
     from coneskin.skin.detection.frame.reading import read
-    from coneskin.skin.wire import FrameDecoder
 
     sensors = {(item.sensor.device_id, item.sensor.sensor_id): item.sensor for item in scene.sensors}
     series: dict[str, tuple[list[float], list[float]]] = {item.sensor.name: ([], []) for item in scene.sensors}
-    decoder = FrameDecoder()
-    for block in run.select(kinds=frozenset({BlockKind.SKIN})):
-        for frame in decoder.feed(block.payload):
-            sensor = sensors.get((frame.device, frame.sensor))
-            if sensor is not None and window[0] <= block.time <= window[1]:
-                times, levels = series[sensor.name]
-                times.append(1e3 * (block.time - zero))
-                levels.append(read(sensor, frame).level)
+    for time, frame in run.frames():
+        sensor = sensors.get((frame.device, frame.sensor))
+        if sensor is not None and window[0] <= time <= window[1]:
+            times, levels = series[sensor.name]
+            times.append(1e3 * (time - zero))
+            levels.append(read(sensor, frame).level)
     for item in scene.sensors:
         axes.plot(*series[item.sensor.name], lw=1.2, label=item.sensor.name)
         axes.axhline(item.sensor.thresholds.touch_level, color="tab:red", lw=0.8, ls="--")
@@ -201,7 +180,6 @@ def _draw_arm(
     word: str,
 ) -> None:
     from coneskin.robot.arm.kinematics import link_pose
-    from coneskin.robot.arm.ur_models import arm_model
     from coneskin.robot.arm.workspace import skeleton
 
     assert scene.arm is not None
