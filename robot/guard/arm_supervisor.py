@@ -115,12 +115,11 @@ class _StateAge:
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
-        limit = f"{1e3 * self._limit:g} ms"
         if self.silent(now):
-            return f"the controller has sent no state for {limit}"
+            return f"the controller has sent no state for {1e3 * self._limit:g} ms"
         if now - self._very_late_since > self._limit:
             causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
-            return f"the controller's states come more than {limit} late: {causes}"
+            return f"the controller's states come more than {1e3 * self._limit:g} ms late: {causes}"
         return ""
 
     def stale(self, now: float) -> str:

@@ -28,7 +28,7 @@ from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, 
 from .place.touch_place import TouchPlace
 from .self_test import FrameSelfTest
 
-__all__ = ["Contradictions", "Detector", "TouchAlarm"]
+__all__ = ["Detector", "TouchAlarm"]
 
 #: called with the sensor's name and the level as soon as a touch is certain, before its place is worked out
 TouchAlarm = Callable[[str, float], None]
@@ -43,35 +43,6 @@ _CONTACT_FAULTS = frozenset(
 )
 _MAX_CONTRADICTIONS = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
 _CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
-
-
-class Contradictions:
-    """Contradictory frames of one sensor: contacts that come or go between the phases, told from faults by number.
-
-    Attributes:
-        count: of those that were taken for a change of contact, less what good frames have taken off.
-    """
-
-    def __init__(self) -> None:
-        self.count = 0.0
-
-    def is_change(self, fault: Fault) -> bool:
-        """Tell whether a fault may be a contact that came or went between the phases of this one frame.
-
-        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
-        rests, or has passed the threshold. If they go on, or come more often than now and then, it is a fault.
-
-        Args:
-            fault: of the frame.
-        """
-        if fault not in _CONTACT_FAULTS or self.count > _MAX_CONTRADICTIONS:
-            return False
-        self.count += 1.0
-        return True
-
-    def forget(self) -> None:
-        """Take a good frame."""
-        self.count = max(0.0, self.count - _CONTRADICTION_DECAY)
 
 
 class _StuckValues:
@@ -143,7 +114,7 @@ class Detector:
         self._places = TouchPlace(sensor, self.settings, self._currents, self._leak)
         self._told = ReportedTouch(sensor, self.settings)
         self._above = self._below = self._quiet = 0
-        self._contradictions = Contradictions()
+        self._contradictions = 0.0  # frames taken for a change of contact, less what good frames have taken off
         self._began = 0.0
         self._lasting = False
 
@@ -186,14 +157,14 @@ class Detector:
         if fault is not None:
             self._places.interrupt()
             self._skip()
-            if not self._contradictions.is_change(fault):
+            if not self._is_change(fault):
                 self._report(events, fault, frame, now)
                 return events
             if whole < self._touch:
                 return events  # the next frames say what it was
         else:
-            if self._contradictions.count:
-                self._contradictions.forget()
+            if self._contradictions:
+                self._contradictions = max(0.0, self._contradictions - _CONTRADICTION_DECAY)
             self.timing.seen_valid(now)
         if self._stuck.feed(frame):
             self._report(events, Fault.STUCK, frame, now)
@@ -215,6 +186,17 @@ class Detector:
         else:
             self._while_untouched(events, frame, now, level)
         return events
+
+    def _is_change(self, fault: Fault) -> bool:
+        """Tell whether a frame's fault may be a contact that came or went between the phases of this one frame.
+
+        The phases are measured one after the other, so such a frame contradicts itself. A few frames later the contact
+        rests, or has passed the threshold. If they go on, or come more often than now and then, it is a fault.
+        """
+        if fault not in _CONTACT_FAULTS or self._contradictions > _MAX_CONTRADICTIONS:
+            return False
+        self._contradictions += 1.0
+        return True
 
     @property
     def fault(self) -> Fault | None:

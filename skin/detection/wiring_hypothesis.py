@@ -179,41 +179,31 @@ def list_hypotheses(sensor: Sensor) -> list[WiringHypothesis]:
     """Return all that may be broken of a sensor, nothing at first."""
     plus_upper, minus_upper = "BA" if sensor.b_positive else "AB"
     plus_lower, minus_lower = "CD" if sensor.c_positive else "DC"
-    upper, lower = Fault.SHORT_UPPER, Fault.SHORT_LOWER
+    upper, lower, leak, driven = Fault.SHORT_UPPER, Fault.SHORT_LOWER, Fault.LEAK, Fault.GUIDE_DRIVEN
     found = [WiringHypothesis(sensor, "nothing", None)]
     for name in _WIRE_NAMES:
         found.append(WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name))
-    for fed in _WIRE_NAMES:
-        fault = Fault.OPEN_UPPER if fed in "AB" else Fault.OPEN_LOWER
-        found.append(WiringHypothesis(sensor, f"{fed} joined to the supply", fault, joined=(fed, "supply")))
-    for pair, fault in (("AB", upper), ("CD", lower)):
-        found.append(WiringHypothesis(sensor, f"{pair[0]} joined with {pair[1]}", fault, joined=(pair[0], pair[1])))
-    for name, fault in (
-        *((plus_upper, upper), (minus_upper, Fault.LEAK)),
-        *((plus_lower, lower), (minus_lower, Fault.LEAK)),
-    ):
-        found.append(WiringHypothesis(sensor, f"{name} joined to ground", fault, joined=(name, "ground")))
-    for name, fault in (
-        *((plus_upper, Fault.GUIDE_DRIVEN), (minus_upper, upper)),
-        *((plus_lower, Fault.GUIDE_DRIVEN), (minus_lower, lower)),
-    ):
-        found.append(WiringHypothesis(sensor, f"switch of {name} stuck at the supply", fault, joined=(name, "rail")))
-    for first in "AB":
-        for second in "CD":
-            words = f"{first} joined with {second}"
-            found.append(WiringHypothesis(sensor, words, Fault.LAYERS_CLOSED, joined=(first, second)))
+    joints: list[tuple[str, Fault, tuple[str, str]]] = []
     for name in _WIRE_NAMES:
-        fault = Fault.GUIDES_DISAGREE if name in "AB" else Fault.LEAK
+        fault = Fault.OPEN_UPPER if name in "AB" else Fault.OPEN_LOWER
+        joints.append((f"{name} joined to the supply", fault, (name, "supply")))
+    joints += [("A joined with B", upper, ("A", "B")), ("C joined with D", lower, ("C", "D"))]
+    for name, fault in ((plus_upper, upper), (minus_upper, leak), (plus_lower, lower), (minus_lower, leak)):
+        joints.append((f"{name} joined to ground", fault, (name, "ground")))
+    for name, fault in ((plus_upper, driven), (minus_upper, upper), (plus_lower, driven), (minus_lower, lower)):
+        joints.append((f"switch of {name} stuck at the supply", fault, (name, "rail")))
+    for first, second in ("AC", "AD", "BC", "BD"):
+        joints.append((f"{first} joined with {second}", Fault.LAYERS_CLOSED, (first, second)))
+    found += [WiringHypothesis(sensor, words, fault, joined=joined) for words, fault, joined in joints]
+    for name in _WIRE_NAMES:
+        fault = Fault.GUIDES_DISAGREE if name in "AB" else leak
         found.append(WiringHypothesis(sensor, f"input of {name} dead", fault, dead=name))
-    found.append(WiringHypothesis(sensor, "touch phase dead", Fault.GUIDE_DRIVEN, dead="touch"))
-    return found
+    return [*found, WiringHypothesis(sensor, "touch phase dead", driven, dead="touch")]
 
 
 _GUIDE_ERROR = 0.01  # part of the supply; what the circuit's model may be off
-_CURRENT_ERROR, _UNLEARNED_CURRENT_ERROR = (
-    0.05,
-    0.25,
-)  # part of a current, where the sheets are known and where not
+_CURRENT_ERROR = 0.05  # part of a current, where the sheets are known
+_UNLEARNED_CURRENT_ERROR = 0.25  # and where they are not
 _FULL_SCALE_ERROR = 0.002  # part of a current's full scale
 
 

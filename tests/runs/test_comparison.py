@@ -61,15 +61,13 @@ def test_a_difference_shows_as_many_digits_as_it_takes(again: Decisions) -> None
 @pytest.mark.parametrize(
     ("name", "detail", "step", "tolerance"),
     [
-        ("contact", "u", 1e-3, {"place_mm": 1.01}),
-        ("contact", "phi", 0.01, {"angle_deg": 0.6}),
-        ("contact", "level", 0.02, {"level": 0.021}),
-        ("decelerating", "speed", 0.02, {"speed_rad_s": 0.021}),
+        ("contact", "u", 1e-3, "place_mm=1.01"),
+        ("contact", "phi", 0.01, "angle_deg=0.6"),
+        ("contact", "level", 0.02, "level=0.021"),
+        ("decelerating", "speed", 0.02, "speed_rad_s=0.021"),
     ],
 )
-def test_each_quantity_has_its_tolerance(
-    again: Decisions, name: str, detail: str, step: float, tolerance: dict[str, float]
-) -> None:
+def test_each_quantity_has_its_tolerance(again: Decisions, name: str, detail: str, step: float, tolerance: str) -> None:
     value = next(e for e in again.events if e.name == name).details[detail]
     moved = changed(again, name, **{detail: value + step})
     first = (again, replace(again, commands=None))[1]
@@ -77,9 +75,9 @@ def test_each_quantity_has_its_tolerance(
     one = replace(first, events=tuple(e for e in first.events if e.name == name)[:1])
     other = replace(moved, events=tuple(e for e in moved.events if e.name == name)[:1])
     assert compare_decisions(one, other).differences
-    assert not compare_decisions(one, other, Tolerances.from_settings(tolerance)).differences
-    half = {key: 0.4 * limit for key, limit in tolerance.items()}
-    assert compare_decisions(one, other, Tolerances.from_settings(half)).differences
+    assert not compare_decisions(one, other, Tolerances.from_words([tolerance])).differences
+    unit, _, limit = tolerance.partition("=")
+    assert compare_decisions(one, other, Tolerances.from_words([f"{unit}={0.4 * float(limit)}"])).differences
 
 
 def test_what_is_missing_and_what_is_new_is_named_with_its_place(again: Decisions) -> None:

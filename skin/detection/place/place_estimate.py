@@ -180,50 +180,36 @@ class PlaceEstimator:
 
     Args:
         sensor: the sensor.
+
+    Attributes:
+        curvature: of the arc at end 1, signed [1/m]: the sheet is stretched by exp(curvature x).
+        length: of the rectangle between the arcs [m].
+        breadth: of the rectangle between the straight edges [m].
+        sheets: conductances of the upper and the lower sheet that it takes them for [S].
     """
 
     def __init__(self, sensor: Sensor) -> None:
         cone = sensor.frustum
-        self._curvature = cone.sin_half_angle / cone.radius1
+        self.curvature = cone.sin_half_angle / cone.radius1
         self._slant = cone.slant
-        self._breadth = cone.radius1 * cone.wrap
-        self._length = math.log1p(self._curvature * cone.slant) / self._curvature if self._curvature else cone.slant
+        self.breadth = cone.radius1 * cone.wrap
+        self.length = math.log1p(self.curvature * cone.slant) / self.curvature if self.curvature else cone.slant
         self._per_y = cone.wrap
         self._within = (
-            *(_EDGE_MARGIN * self._length, (1.0 - _EDGE_MARGIN) * self._length),
-            *(_EDGE_MARGIN * self._breadth, (1.0 - _EDGE_MARGIN) * self._breadth),
+            *(_EDGE_MARGIN * self.length, (1.0 - _EDGE_MARGIN) * self.length),
+            *(_EDGE_MARGIN * self.breadth, (1.0 - _EDGE_MARGIN) * self.breadth),
         )
-        self._sheets = (0.0, 0.0)
+        self.sheets = (0.0, 0.0)
         self._sum = 0.0
         self._robin = self._learn(
-            self._breadth / (sensor.upper_sheet_ohms * self._length),
-            self._length / (sensor.lower_sheet_ohms * self._breadth),
+            self.breadth / (sensor.upper_sheet_ohms * self.length),
+            self.length / (sensor.lower_sheet_ohms * self.breadth),
         )
 
-    @property
-    def length(self) -> float:
-        """Length of the rectangle between the arcs [m]."""
-        return self._length
-
-    @property
-    def curvature(self) -> float:
-        """Curvature of the arc at end 1, signed [1/m]: the sheet is stretched by exp(curvature x)."""
-        return self._curvature
-
-    @property
-    def sheets(self) -> tuple[float, float]:
-        """Conductances of the upper and the lower sheet that it takes them for [S]."""
-        return self._sheets
-
-    @property
-    def breadth(self) -> float:
-        """Breadth of the rectangle between the straight edges [m]."""
-        return self._breadth
-
     def _learn(self, upper: float, lower: float) -> RobinFunction:
-        upper_ohms, lower_ohms = self._breadth / (upper * self._length), self._length / (lower * self._breadth)
-        self._sheets, self._sum = (upper, lower), upper_ohms + lower_ohms
-        self._robin = RobinFunction(self._length, self._breadth, upper_ohms, lower_ohms)
+        upper_ohms, lower_ohms = self.breadth / (upper * self.length), self.length / (lower * self.breadth)
+        self.sheets, self._sum = (upper, lower), upper_ohms + lower_ohms
+        self._robin = RobinFunction(self.length, self.breadth, upper_ohms, lower_ohms)
         return self._robin
 
     def estimate(
@@ -238,10 +224,10 @@ class PlaceEstimator:
             sheets: without contact.
         """
         if not (
-            0.998 < sheets.upper / self._sheets[0] < 1.002 and 0.998 < sheets.lower / self._sheets[1] < 1.002
+            0.998 < sheets.upper / self.sheets[0] < 1.002 and 0.998 < sheets.lower / self.sheets[1] < 1.002
         ):  # the edges' images depend on them, by less than this matters
             self._learn(sheets.upper, sheets.lower)
-        length, breadth, rs = self._length, self._breadth, self._sum
+        length, breadth, rs = self.length, self.breadth, self._sum
         seen_x, seen_y = matrix.x * length, matrix.y * breadth
         squares = length * length, length * breadth, breadth * breadth
         a_xx, a_yy = (matrix.along - sheets.upper) * squares[0], (matrix.around - sheets.lower) * squares[2]
@@ -253,9 +239,9 @@ class PlaceEstimator:
         noise_xy = share * one.cross * squares[1] * squares[1]
 
         x, y = self._inside(seen_x, seen_y)
-        stretch = math.exp(self._curvature * x)
+        stretch = math.exp(self.curvature * x)
         robin, slope_x, slope_y = self._robin.value_and_gradient(x, y)
-        taper = rs * self._curvature / (4.0 * math.pi)
+        taper = rs * self.curvature / (4.0 * math.pi)
         xx = share * one.xx * squares[0]
         xy = share * one.xy * squares[1]
         yy = share * one.yy * squares[2]
@@ -304,7 +290,7 @@ class PlaceEstimator:
         area = abs(dipole.strength) * rs / (2.0 * math.pi)
         edge, moved = self._edge(x, y), math.hypot(move_x, move_y)
         neglected = (
-            area * (_NEXT_IMAGE * moved / (edge * edge) + _NEXT_TAPER * math.sqrt(area) * self._curvature**2)
+            area * (_NEXT_IMAGE * moved / (edge * edge) + _NEXT_TAPER * math.sqrt(area) * self.curvature**2)
         ) ** 2
         xx += by_mean[0] ** 2 * var_mean + by_half[0] ** 2 * var_half + by_cross[0] ** 2 * var_cross
         xx += 2.0 * by_mean[0] * x_mean + neglected
@@ -312,16 +298,16 @@ class PlaceEstimator:
         yy += 2.0 * by_mean[1] * y_mean + neglected
         xy += by_mean[0] * by_mean[1] * var_mean + by_half[0] * by_half[1] * var_half
         xy += by_cross[0] * by_cross[1] * var_cross + by_mean[1] * x_mean + by_mean[0] * y_mean
-        stretch = math.exp(self._curvature * x)
+        stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
         return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole)
 
     def place(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float]:
         """Return u [m] and phi [rad] of an electrical centre and the move from there to the place [m]."""
-        curvature, breadth = self._curvature, self._breadth
+        curvature, breadth = self.curvature, self.breadth
         low_x, high_x, low_y, high_y = self._within
-        along, around = x * self._length + move_x, y * breadth + move_y
+        along, around = x * self.length + move_x, y * breadth + move_y
         if not (low_x < along < high_x and low_y < around < high_y):
             along, around = self._inside(along, around)
         return math.expm1(curvature * along) / curvature if curvature else along, around / breadth * self._per_y
@@ -335,7 +321,7 @@ class PlaceEstimator:
 
     def _edge(self, x: float, y: float) -> float:
         """Return the distance to the nearest edge, in the rectangle [m]."""
-        return min(x, self._length - x, y, self._breadth - y)
+        return min(x, self.length - x, y, self.breadth - y)
 
 
 def _gain(seen: float, noise: float, prior: float) -> float:

@@ -44,6 +44,9 @@ _OFFSET_1, _OFFSET_3, _OFFSET_5 = (
 _ACROSS_DEVIATION = 0.5  # of the mean distance; standard deviation of the centroid across the seam
 _ALONG_DEVIATION = 0.1  # of the mean distance; likewise along the side
 
+_MIN_SEAM_SHARE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
+_CONDUCTANCE_CHANGE = 0.05  # ratio by which the conductance may differ from its mean
+
 _OVER_SEAM = "it presses on both sides of the seam: too far from it, or too long, for one contact"
 
 
@@ -57,20 +60,23 @@ class SeamPlace(NamedTuple):
     elongation: tuple[float, float]  #: half length [m] and direction of the line across the seam [rad]
 
 
-class _SeamTest:
-    """The seam of one sensor.
+class SeamCertainty:
+    """The presses over the seam of one sensor.
 
     Args:
         sensor: the sensor.
-        settings: the weakest second contact that is to be excluded.
+        settings: how far a place may move while it is certain, and the weakest second contact that is to be excluded.
         estimator: of its places.
+        breadth: of the wrap at the wider end [m].
+
+    Attributes:
+        closes: the wrap closes, so that one body can press on both edges.
     """
 
-    def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator) -> None:
+    def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator, breadth: float) -> None:
         cone = sensor.frustum
-        self._wrap, self._slant, self._radius_at = cone.wrap, cone.slant, cone.radius_at
+        self._wrap, self._radius_at = cone.wrap, cone.radius_at
         self._gap = 0.5 * max(0.0, 2.0 * math.pi - cone.wrap)  # [rad], from an edge to the middle of the seam
-        #: whether the wrap closes, so that one body can press on both edges
         self.closes = 2.0 * self._gap <= _MAX_GAP
         self._limit = settings.second_contact
         self._angle = (DANGEROUS_ANGLE - self._gap) / cone.wrap  # of the wrap
@@ -79,8 +85,13 @@ class _SeamTest:
         self._coupling = tuple(
             2.0 / (math.pi * n * math.sinh(min(n * math.pi * aspect, 300.0))) for n in range(1, _COUPLING_TERMS + 1)
         )
+        self._map, self._lower = sensor.place_map, estimator.sheets[1]
+        self._settle = settings.settle_distance**2
+        self._breadth = breadth
+        self._before: tuple[float, float] | None = None  # place in the frame before
+        self._held = False  # it was certain
 
-    def place(
+    def _place(
         self, matrix: ContactMatrix, one: MatrixNoise, frames: float, sheets: SheetConductances
     ) -> SeamPlace | None:
         """Return the centroid of a press over the seam. None where what presses does not lie on both its sides.
@@ -163,40 +174,13 @@ class _SeamTest:
             (math.hypot(0.5 * ahead, half), math.atan2(half, 0.5 * ahead) - (math.pi if ahead < 0.0 else 0.0)),
         )
 
-
-_MIN_SEAM_SHARE = 0.02  # P_yy over G; a press over the seam has more, and most touches are told from one by this alone
-_CONDUCTANCE_CHANGE = 0.05  # ratio by which the conductance may differ from its mean
-
-
-class SeamCertainty:
-    """The presses over the seam of one sensor.
-
-    Args:
-        sensor: the sensor.
-        settings: how far a place may move while it is certain, and the weakest second contact.
-        estimator: of its places.
-        breadth: of the wrap at the wider end [m].
-
-    Attributes:
-        closes: the wrap closes, so that one body can press on both edges.
-    """
-
-    def __init__(self, sensor: Sensor, settings: DetectorSettings, estimator: PlaceEstimator, breadth: float) -> None:
-        self._test = _SeamTest(sensor, settings, estimator)
-        self.closes = self._test.closes
-        self._map, self._lower = sensor.place_map, estimator.sheets[1]
-        self._settle = settings.settle_distance**2
-        self._breadth, self._wrap = breadth, sensor.frustum.wrap
-        self._place: tuple[float, float] | None = None  # of the frame before
-        self._held = False  # its place was certain
-
     def end(self) -> None:
         """Forget the touch: it is over."""
-        self._place, self._held = None, False
+        self._before, self._held = None, False
 
     def interrupt(self) -> None:
         """Note a frame that is no press over the seam: the next one follows no other."""
-        self._place = None
+        self._before = None
 
     def may_be(self, values: tuple[float, float, float, float, float, float]) -> bool:
         """Tell at little cost whether a touch may be a press over the seam.
@@ -225,14 +209,14 @@ class SeamCertainty:
             conductance: of the newest frame [S].
             valid: the newest frame does not contradict itself.
         """
-        seam = self._test.place(mean, noise, frames, sheets)
+        seam = self._place(mean, noise, frames, sheets)
         if seam is None:
-            self._place = None
+            self._before = None
             return None
         if self._map is not None:
             wrap = self._map.frustum.wrap
             seam = seam._replace(u=0.5 * (self._map.apply(seam.u, 0.0)[0] + self._map.apply(seam.u, wrap)[0]))
-        before, self._place = self._place, seam[:2]
+        before, self._before = self._before, seam[:2]
         if not valid:
             return seam._replace(doubt=CONTRADICTS)
         changes = abs(conductance / mean.conductance - 1.0) > _CONDUCTANCE_CHANGE

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.detector import Contradictions, Detector
+from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import ReportedTouch, SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.reading import TouchReading
@@ -27,33 +27,24 @@ from tests.skin.detection.detector_bench import FIRM, SENSOR, DetectorBench, fau
 
 
 def test_three_in_a_row_may_be_a_contact_and_each_one_more_is_a_fault() -> None:
-    frames = Contradictions()
-    assert [frames.is_change(Fault.LEAK) for _ in range(5)] == [True, True, True, False, False]
+    detector = Detector(SENSOR)
+    assert [detector._is_change(Fault.LEAK) for _ in range(5)] == [True, True, True, False, False]
 
 
-def test_ten_good_frames_make_up_for_one() -> None:
-    frames = Contradictions()
-    while frames.is_change(Fault.OUT_OF_RANGE):
-        pass
-    for _ in range(10):
-        frames.forget()
-    assert frames.count == pytest.approx(2.0)
-    assert frames.is_change(Fault.OUT_OF_RANGE)
-    assert not frames.is_change(Fault.OUT_OF_RANGE)
-
-
-def test_good_frames_alone_are_no_credit() -> None:
-    frames = Contradictions()
-    for _ in range(100):
-        frames.forget()
-    assert frames.count == 0.0
+def test_ten_good_frames_make_up_for_one_and_are_no_credit() -> None:
+    bench = DetectorBench()
+    bench.feed(times=100)
+    taken = [bench.detector._is_change(Fault.OUT_OF_RANGE) for _ in range(4)]
+    bench.feed(times=10)
+    taken += [bench.detector._is_change(Fault.OUT_OF_RANGE) for _ in range(2)]
+    assert taken == [True, True, True, False, True, False]
 
 
 @pytest.mark.parametrize("fault", [Fault.STUCK, Fault.RESTARTED, Fault.SILENT])
 def test_no_contact_looks_like_another_fault(fault: Fault) -> None:
-    frames = Contradictions()
-    assert not frames.is_change(fault)
-    assert frames.count == 0.0
+    detector = Detector(SENSOR)
+    assert not detector._is_change(fault)
+    assert all(detector._is_change(Fault.LEAK) for _ in range(3))
 
 
 CERTAIN = 200  # frames; within them a second contact is excluded

@@ -88,17 +88,24 @@ class Tolerances:
     relative: float = 1e-9
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, float]) -> Tolerances:
-        """Return tolerances from values with the unit in the name.
+    def from_words(cls, words: Iterable[str]) -> Tolerances:
+        """Return tolerances from words with the unit in the name.
 
         Args:
-            settings: any of ``place_mm``, ``angle_deg``, ``level``, ``speed_rad_s``, ``time_ms``, ``relative``.
+            words: such as "place_mm=0.5"; the others are ``angle_deg``, ``level``, ``speed_rad_s``, ``time_ms`` and
+                ``relative``.
 
         Raises:
             RecordingError: a name is another, or a value is negative or not finite.
         """
         values = {}
-        for name, value in settings.items():
+        for word in words:
+            name, _, text = word.partition("=")
+            name = name.strip()
+            try:
+                value = float(text)
+            except ValueError:
+                raise RecordingError(f"a tolerance is NAME=VALUE, such as place_mm=0.5, got {word!r}") from None
             if name not in _TOLERANCE_UNITS:
                 raise RecordingError(f"there is no tolerance {name}; there are {', '.join(_TOLERANCE_UNITS)}")
             if not (math.isfinite(value) and value >= 0.0):
@@ -106,18 +113,6 @@ class Tolerances:
             field, factor = _TOLERANCE_UNITS[name]
             values[field] = value * factor
         return cls(**values)
-
-    @classmethod
-    def from_words(cls, words: Iterable[str]) -> Tolerances:
-        """Return tolerances from words such as "place_mm=0.5"; errors as of ``from_settings``."""
-        settings = {}
-        for word in words:
-            name, _, text = word.partition("=")
-            try:
-                settings[name.strip()] = float(text)
-            except ValueError:
-                raise RecordingError(f"a tolerance is NAME=VALUE, such as place_mm=0.5, got {word!r}") from None
-        return cls.from_settings(settings)
 
 
 EXACT = Tolerances(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  #: every bit counts

@@ -2,7 +2,6 @@
 
 import math
 import random
-from types import SimpleNamespace
 
 import pytest
 
@@ -30,7 +29,7 @@ def follow():
 
     def take(conductance: float, u: float = 0.1, valid: bool = True) -> str:
         seam = SeamPlace(u, 0.0, (1e-6, 0.0, 1e-6), "", (0.01, 1.57))
-        certainty._test = SimpleNamespace(place=lambda *_: seam)
+        certainty._place = lambda *_: seam
         return certainty.feed(MEAN, None, 8.0, None, conductance, valid).doubt
 
     take.certainty = certainty
