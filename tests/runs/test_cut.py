@@ -32,8 +32,8 @@ def test_a_cut_replays_to_the_same_contact_and_reaction(collision: Run, tmp_path
     assert contact.time == whole.time
     assert contact.details["u"] == pytest.approx(whole.details["u"], abs=5e-4)
     summary = summarise_run(cut.path, run)
-    assert summary.cut == {"from": "demo", "around_s": 2.95, "keep_s": 1.0}
-    assert summary.duration < 1.2
+    assert summary["cut"] == {"from": "demo", "around_s": 2.95, "keep_s": 1.0}
+    assert summary["duration_s"] < 1.2
 
 
 def test_a_cut_that_shows_another_reaction_says_so(collision: Run, tmp_path: Path) -> None:

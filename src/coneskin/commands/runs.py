@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.text import printable
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from coneskin.core.progress import ProgressBar
     from coneskin.runs.decisions import Decisions
     from coneskin.runs.replay.run import Run
-    from coneskin.runs.run_files import RunSummary
 
 __all__ = ["INCOMPLETE", "add_arguments", "run"]
 
@@ -157,26 +156,28 @@ def _list(args: argparse.Namespace) -> int:
         print(f"{'began':19}  {'duration':>10}  {'size':>9}  contacts  stops  arm     run")
     for path in find_recordings(args.runs, beside=True):
         try:
-            summary = _summary(path)
+            facts = _summary(path)
         except ConeSkinError as exc:
             broken += 1
             rows.append({"path": str(path), "error": str(exc)})
             if not args.json:
                 print(printable(f"{path}: cannot be read: {exc}"))
             continue
-        rows.append(summary.facts())
+        rows.append(facts)
         if not args.json:
-            said = "  INCOMPLETE" if summary.missing else ""
+            said = "  INCOMPLETE" if facts["missing"] else ""
+            folder = path.parent if path.name == "run.rec" else path
+            size, arm = facts["size_bytes"] / 1e3, facts["arm"] or "-"
             print(printable(
-                f"{summary.began:19}  {summary.duration:8.1f} s  {summary.size / 1e3:6.0f} kB  {summary.contacts:8}  "
-                f"{summary.stops:5}  {summary.arm or '-':6}  {path.parent if path.name == 'run.rec' else path}{said}"
+                f"{facts['began'] or '':19}  {facts['duration_s']:8.1f} s  {size:6.0f} kB  {facts['contacts']:8}  "
+                f"{facts['stops']:5}  {arm:6}  {folder}{said}"
             ))  # fmt: skip
     if args.json:
         print(json.dumps({"runs": rows}))
     return 1 if broken else 0
 
 
-def _summary(path: Path) -> RunSummary:
+def _summary(path: Path) -> dict[str, Any]:
     from coneskin.runs.run_files import summarise_run
 
     return summarise_run(path, _read(path), _bar(f"{path}"))
@@ -198,24 +199,25 @@ def _info(args: argparse.Namespace) -> int:
     from coneskin.runs.run_files import summarise_run
 
     recorded = _read(args.run)
-    summary = summarise_run(args.run, recorded, _bar(f"{args.run}"))
+    facts = summarise_run(args.run, recorded, _bar(f"{args.run}"))
     if args.json:
-        print(json.dumps(summary.facts()))
+        print(json.dumps(facts))
         return 0
+    words = [facts["arm"] or "none", facts["reaction"] and f"reaction {facts['reaction']}"]
     lines = [
-        f"{summary.path}: {summary.size / 1e3:.0f} kB",
-        f"recorded {summary.began or 'at a time that it does not tell'} by coneskin {summary.coneskin or '(unknown)'}, "
-        f"from {summary.first:.3f} s to {summary.first + summary.duration:.3f} s after its start",
-        f"arm {', '.join(filter(None, (summary.arm or 'none', summary.reaction and f'reaction {summary.reaction}')))}"
-        + (f"; {summary.commissioned}" if summary.commissioned else ""),
-        f"sensors: {', '.join(summary.sensors)}",
-        "blocks: " + ", ".join(f"{count} {kind}" for kind, count in summary.blocks.items()),
+        f"{facts['path']}: {facts['size_bytes'] / 1e3:.0f} kB",
+        f"recorded {facts['began'] or 'at a time that it does not tell'} "
+        f"by coneskin {facts['coneskin'] or '(unknown)'}, "
+        f"from {facts['first_s']:.3f} s to {facts['first_s'] + facts['duration_s']:.3f} s after its start",
+        f"arm {', '.join(filter(None, words))}" + (f"; {facts['commissioned']}" if facts["commissioned"] else ""),
+        f"sensors: {', '.join(facts['sensors'])}",
+        "blocks: " + ", ".join(f"{count} {kind}" for kind, count in facts["blocks"].items()),
     ]
-    if summary.cut:
-        around = summary.cut.get("around_s")
+    if cut := facts["cut"]:
+        around = cut.get("around_s")
         around = f"{around:.3f}" if isinstance(around, float) else around  # a file may hold anything
-        lines.append(f"cut from {summary.cut.get('from')!r}, around {around} s")
-    lines.append(f"MISSING: {summary.missing}" if summary.missing else "whole: nothing is missing")
+        lines.append(f"cut from {cut.get('from')!r}, around {around} s")
+    lines.append(f"MISSING: {facts['missing']}" if facts["missing"] else "whole: nothing is missing")
     print(printable("\n".join([*lines, *recorded.timeline()])))
     return 0
 
@@ -226,7 +228,7 @@ def _verify(args: argparse.Namespace) -> int:
     rows, codes = [], {0}
     for path in find_recordings(args.runs, beside=True):
         try:
-            missing = _summary(path).missing
+            missing = _summary(path)["missing"]
             code, said = (INCOMPLETE, f"incomplete: {missing}") if missing else (0, "whole")
         except ConeSkinError as exc:
             code, said = 1, f"cannot be read: {exc}"

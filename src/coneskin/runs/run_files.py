@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName
 if TYPE_CHECKING:
     from .replay.run import Run
 
-__all__ = ["RunSummary", "find_recordings", "is_further_part", "is_run", "run_name", "summarise_run"]
+__all__ = ["find_recordings", "is_further_part", "is_run", "run_name", "summarise_run"]
 
 _IN_FOLDER = "run.rec"
 _FILE_SUFFIX = ".rec"
@@ -72,76 +71,12 @@ def is_further_part(path: Path) -> bool:
     return match is not None and path.with_name(match[1] + _FILE_SUFFIX).is_file()
 
 
-@dataclass(frozen=True, slots=True)
-class RunSummary:
-    """Summary of one run.
+def summarise_run(path: Path, run: Run, progress: Progress = silent) -> dict[str, Any]:
+    """Return what is in a run, as values for JSON with units in the names; None where there is nothing to tell.
 
-    Attributes:
-        path: of its recording.
-        size: of that file [bytes].
-        began: when it was recorded, in local time; empty where it does not say.
-        first: when its first block came [s since the start of the run].
-        duration: from that to its last [s].
-        contacts: touches that were reported.
-        stops: that were sent.
-        faults: that were reported.
-        missing: what the recording has lost, in a sentence; empty where nothing.
-        arm: model, or empty.
-        sensors: their names, with their links.
-        reaction: its kind; empty without an arm.
-        coneskin: version that recorded it, with its commit where that is known.
-        commissioned: why the arm may move away, or why it only stops.
-        blocks: number of blocks by their kind.
-        cut: what it was cut from, or None.
-    """
-
-    path: Path
-    size: int
-    began: str
-    first: float
-    duration: float
-    contacts: int
-    stops: int
-    faults: int
-    missing: str
-    arm: str
-    sensors: tuple[str, ...]
-    reaction: str
-    coneskin: str
-    commissioned: str
-    blocks: Mapping[str, int]
-    cut: Mapping[str, Any] | None
-
-    @property
-    def name(self) -> str:
-        """Name of the run."""
-        return run_name(self.path)
-
-    def facts(self) -> dict[str, Any]:
-        """Return the summary as values for JSON."""
-        return {
-            "run": self.name,
-            "path": str(self.path),
-            "size_bytes": self.size,
-            "began": self.began or None,
-            "first_s": self.first,
-            "duration_s": self.duration,
-            "contacts": self.contacts,
-            "stops": self.stops,
-            "faults": self.faults,
-            "missing": self.missing or None,
-            "arm": self.arm or None,
-            "sensors": list(self.sensors),
-            "reaction": self.reaction or None,
-            "coneskin": self.coneskin or None,
-            "commissioned": self.commissioned or None,
-            "blocks": dict(self.blocks),
-            "cut": None if self.cut is None else dict(self.cut),
-        }
-
-
-def summarise_run(path: Path, run: Run, progress: Progress = silent) -> RunSummary:
-    """Return the summary of a run.
+    Times count from the start of the run, but ``began``, which is local time. ``size_bytes`` is that of the first file,
+    ``commissioned`` says why the arm may move away or only stops, ``blocks`` how many there are of each kind, and
+    ``cut`` what the run was cut from.
 
     Args:
         path: of its recording, or its folder.
@@ -157,28 +92,26 @@ def summarise_run(path: Path, run: Run, progress: Progress = silent) -> RunSumma
         kinds[block.kind] += 1
     since, until = run.span
     names = Counter(event.name for event in run.events)
-    unix = header["clocks"].get("unix")
-    began = ""
-    if is_time(unix) and 0.0 <= unix < 1e11:
-        began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(unix))
-    cut = header.get("cut")
+    unix, cut = header["clocks"].get("unix"), header.get("cut")
+    dated = is_time(unix) and 0.0 <= unix < 1e11
     file = path / "run.rec" if path.is_dir() else path
     known = {kind.value: kind.name.lower() for kind in BlockKind}
-    return RunSummary(
-        path=file,
-        size=file.stat().st_size,
-        began=began,
-        first=since - run.start,
-        duration=until - since,
-        contacts=names[EventName.CONTACT],
-        stops=names[EventName.STOPPING],
-        faults=names[EventName.FAULT],
-        missing=run.missing,
-        arm=scene.arm.model if scene.arm else "",
-        sensors=tuple(f"{item.sensor.name} ({link.name})" for link in scene.links for item in link.sensors),
-        reaction=scene.default_reaction.kind if scene.arm else "",
-        coneskin=run.recorded_by,
-        commissioned=run.commissioning.note if run.commissioning and scene.arm else "",
-        blocks={known.get(kind, f"kind {kind}"): count for kind, count in sorted(kinds.items())},
-        cut=cut if isinstance(cut, dict) else None,
-    )
+    return {
+        "run": run_name(file),
+        "path": str(file),
+        "size_bytes": file.stat().st_size,
+        "began": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(unix)) if dated else None,
+        "first_s": since - run.start,
+        "duration_s": until - since,
+        "contacts": names[EventName.CONTACT],
+        "stops": names[EventName.STOPPING],
+        "faults": names[EventName.FAULT],
+        "missing": run.missing or None,
+        "arm": scene.arm.model if scene.arm else None,
+        "sensors": [f"{item.sensor.name} ({link.name})" for link in scene.links for item in link.sensors],
+        "reaction": scene.default_reaction.kind if scene.arm else None,
+        "coneskin": run.recorded_by or None,
+        "commissioned": (run.commissioning.note or None) if run.commissioning and scene.arm else None,
+        "blocks": {known.get(kind, f"kind {kind}"): count for kind, count in sorted(kinds.items())},
+        "cut": cut if isinstance(cut, dict) else None,
+    }

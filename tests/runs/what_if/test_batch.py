@@ -75,7 +75,7 @@ def test_a_table_over_runs_and_variants(runs: list[Path], tmp_path: Path) -> Non
     assert found == [("as recorded", 0, 1), (deaf.variant, 2, 1)]
 
 
-def killed_by_broken(path: Path, variants: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def killed_by_broken(path: Path, variants: Sequence[Mapping[str, Any]], *_: object) -> list[dict[str, Any]]:
     """As ``judge_run``, but a broken run kills its process, as the kernel does when memory runs out."""
     if path.stem == "broken":
         os.kill(os.getpid(), signal.SIGKILL)

@@ -20,24 +20,15 @@ __all__ = ["judge_runs"]
 _CONNECT_TIMEOUT = 30.0  # s
 
 
+Rows = list[dict[str, Any]]
+_Judge = Callable[..., Rows]  # as ``judge_run``
+_Variants = Sequence[Mapping[str, Any]]
+
+
 def _judge_on_cluster(
-    address: str,
-    paths: Sequence[Path],
-    variants: Sequence[Mapping[str, Any]],
-    judge: Callable[[Path, Sequence[Mapping[str, Any]]], list[dict[str, Any]]],
-) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
-    """Yield each run with its rows, as the workers finish them.
-
-    Args:
-        address: of the scheduler, such as "tcp://10.0.0.5:8786".
-        paths: of the recordings, as the workers see them.
-        variants: settings.
-        judge: what is done with a run; a run on which a worker dies three times is a row with its error.
-
-    Raises:
-        MissingExtra: distributed is not installed.
-        RecordingError: the scheduler cannot be reached.
-    """
+    address: str, paths: Sequence[Path], variants: _Variants, judge: _Judge
+) -> Iterator[tuple[Path, Rows]]:
+    """Yield each run with its rows, as the workers finish them. One on which a worker dies three times is an error."""
     try:
         from distributed import Client, as_completed
     except ImportError as exc:
@@ -57,10 +48,6 @@ def _judge_on_cluster(
                 yield path, future.result()
             else:
                 yield path, broken_rows(path, variants, f"{future.status}: {future.exception()}")
-
-
-Rows = list[dict[str, Any]]
-_Judge = Callable[[Path, Sequence[Mapping[str, Any]]], Rows]
 
 
 def judge_runs(
@@ -106,22 +93,13 @@ def judge_runs(
 
 
 def _judge_here(
-    paths: Sequence[Path], variants: Sequence[Mapping[str, Any]], judge: _Judge, progress: Progress
+    paths: Sequence[Path], variants: _Variants, judge: _Judge, progress: Progress
 ) -> Iterator[tuple[Path, Rows]]:
     for number, path in enumerate(paths):
-        if judge is judge_run:  # which tells how far it is in a long run
-
-            def tell(done: float, before: int = number) -> None:
-                progress((before + done) / len(paths))
-
-            yield path, judge_run(path, variants, tell)
-        else:
-            yield path, judge(path, variants)
+        yield path, judge(path, variants, lambda done, before=number: progress((before + done) / len(paths)))
 
 
-def _judge_in_pool(
-    paths: Sequence[Path], variants: Sequence[Mapping[str, Any]], jobs: int, judge: _Judge
-) -> Iterator[tuple[Path, Rows]]:
+def _judge_in_pool(paths: Sequence[Path], variants: _Variants, jobs: int, judge: _Judge) -> Iterator[tuple[Path, Rows]]:
     left = list(paths)
     try:
         with _pool(jobs) as pool:
@@ -136,7 +114,7 @@ def _judge_in_pool(
             yield path, _judge_alone(path, variants, judge)
 
 
-def _judge_alone(path: Path, variants: Sequence[Mapping[str, Any]], judge: _Judge) -> Rows:
+def _judge_alone(path: Path, variants: _Variants, judge: _Judge) -> Rows:
     try:
         with _pool(1) as pool:
             return _rows_of(pool.submit(judge, path, variants), path, variants)
@@ -148,7 +126,7 @@ def _pool(jobs: int) -> concurrent.futures.ProcessPoolExecutor:
     return concurrent.futures.ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
 
 
-def _rows_of(future: concurrent.futures.Future[Rows], path: Path, variants: Sequence[Mapping[str, Any]]) -> Rows:
+def _rows_of(future: concurrent.futures.Future[Rows], path: Path, variants: _Variants) -> Rows:
     try:
         return future.result()
     except BrokenProcessPool:
