@@ -313,8 +313,10 @@ def test_the_thickness_of_the_sheets_keeps_them_apart_in_a_corner() -> None:
 def test_two_partial_wraps_share_a_tube() -> None:
     """Sheets of 150 degrees on two sides of one tube: neither lies on the other."""
     one, two = cones(placed(frustum(0.05, 0.05, 0.2)), wrap=math.radians(150.0)).sheets
-    assert one.axis == two.axis == 0
-    assert clashes(one, two, 0.006) == 0
+    for sheet in (one, two):  # about the one line, however many axes along it were found
+        assert off(sheet)[0] < 0.01
+        assert off(sheet)[1] < 0.01
+    assert clashes(one, two, 0.006) == clashes(two, one, 0.006) == 0
 
 
 @pytest.mark.long
