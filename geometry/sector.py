@@ -52,7 +52,7 @@ class Sector:
             )
 
     @classmethod
-    def from_polar(cls, r1: float, r2: float, theta0: float) -> Sector:
+    def from_radii(cls, r1: float, r2: float, theta0: float) -> Sector:
         """Make a sector from radii r1 (end 1), r2 (end 2) [m] and the central angle theta0 [rad], as in the paper.
 
         Raises:

@@ -89,7 +89,7 @@ HOT = {
     "robot/reaction": "retreat types",
     "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",
-    "robot/guard/motion": "motion_away reaction_motion",
+    "robot/guard/motion": "motion_away setpoint_stream",
     "robot/stop": "stop_monitor",
     "robot/ur": "driver_process state_reader ur_rtde",
 }

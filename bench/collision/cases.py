@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bench.report import head, quantile
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.types import Reaction
 from tests.support.collision_rig import CollisionRig

@@ -13,7 +13,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.skin.sensor import Sensor
 from tests.support.collision_rig import SkinOnLink
 from tests.support.pressing_body import Body

@@ -15,7 +15,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.ur.driver import UR_DRIVER
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.report import head, show
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.scenes import forearm_scene
 

@@ -22,7 +22,7 @@ from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, Struck
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
 from coneskin.robot.arm.model import Joints
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.skin.materials import Padding
 from tests.support.effective_mass import effective_mass
 

@@ -20,7 +20,7 @@ from bench.report import head, quantile
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.robot.arm.inertia import arm_inertia
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.skin.materials import Padding
 from tests.support.effective_mass import effective_mass
 

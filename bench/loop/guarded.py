@@ -12,7 +12,7 @@ from typing import Any
 from coneskin.core.channel import Channel, pair
 from coneskin.core.recording.block import Block
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor

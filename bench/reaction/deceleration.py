@@ -17,7 +17,7 @@ import random
 from bench.report import head, quantile, show
 from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 
 PAYLOAD_MASSES = {
     "UR3": 3.0,

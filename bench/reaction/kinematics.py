@@ -19,7 +19,7 @@ from bench.report import head
 from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Reaction
 from tests.support.pinocchio_arm import load_pinocchio, pin_arm, pin_jacobian, pin_place

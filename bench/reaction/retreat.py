@@ -15,7 +15,7 @@ import random
 from bench.report import head
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
 from coneskin.robot.arm.kinematics import point_jacobian
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import MIN_PROGRESS, RetreatPlan, plan_retreat
 from coneskin.robot.reaction.types import ArmState, Reaction
 from tests.support.retreat_simulation import follow, joints_within, touch

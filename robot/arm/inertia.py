@@ -31,7 +31,7 @@ from coneskin.geometry.pose import Vector
 
 from .kinematics import JOINTS, link_poses, point_jacobian
 from .model import ArmModel, Joints
-from .ur_models import arm_model
+from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
 
 __all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "mass_matrix"]

@@ -14,27 +14,12 @@ Sources:
 from __future__ import annotations
 
 import math
-import re
-
-from coneskin.core.errors import KinematicsError
 
 from .model import ArmModel, Joints
 
-__all__ = ["MODEL_NAMES", "arm_model"]
+__all__ = ["UR_MODELS"]
 
 _QUARTER_TURN = math.pi / 2.0  # rad
-
-
-def arm_model(name: str) -> ArmModel:
-    """Return the nominal arm of that name; case, spaces, hyphens and underscores do not matter ("ur-10e", "UR10 e").
-
-    Raises:
-        KinematicsError: there is no such arm; the message lists all.
-    """
-    found = _MODEL_TABLE.get(re.sub(r"[\s_-]", "", name).lower())
-    if found is None:
-        raise KinematicsError(f"arm must be one of {', '.join(MODEL_NAMES)}, got {name!r}")
-    return found
 
 
 def _deg(*degrees: float) -> Joints:
@@ -64,21 +49,16 @@ _MEDIUM_SPEEDS = _deg(180, 180, 180, 180, 180, 180)
 _LARGE_SPEEDS = _deg(120, 120, 180, 180, 180, 180)
 _HEAVY_SPEEDS = _deg(120, 120, 150, 210, 210, 210)
 
-_MODEL_TABLE = {
-    arm.name.lower(): arm
-    for arm in (  # d1, a2, a3, d4, d5, d6 [m]
-        _arm("UR3", (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819), _SMALL_SPEEDS, math.inf),
-        _arm("UR5", (0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823), _MEDIUM_SPEEDS),
-        _arm("UR10", (0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922), _LARGE_SPEEDS),
-        _arm("UR3e", (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921), _SMALL_SPEEDS, math.inf),
-        _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
-        _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
-        _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
-        _arm("UR16e", (0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
-        _arm("UR20", (0.2363, -0.8620, -0.7287, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
-        _arm("UR30", (0.2363, -0.6370, -0.5037, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
-    )
-}
-
-#: names that ``arm_model`` knows
-MODEL_NAMES = tuple(arm.name for arm in _MODEL_TABLE.values())
+#: all arms of the maker
+UR_MODELS = (  # d1, a2, a3, d4, d5, d6 [m]
+    _arm("UR3", (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819), _SMALL_SPEEDS, math.inf),
+    _arm("UR5", (0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823), _MEDIUM_SPEEDS),
+    _arm("UR10", (0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922), _LARGE_SPEEDS),
+    _arm("UR3e", (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921), _SMALL_SPEEDS, math.inf),
+    _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
+    _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
+    _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+    _arm("UR16e", (0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+    _arm("UR20", (0.2363, -0.8620, -0.7287, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
+    _arm("UR30", (0.2363, -0.6370, -0.5037, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
+)

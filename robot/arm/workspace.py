@@ -15,7 +15,7 @@ from coneskin.geometry.pose import Vector
 
 from .kinematics import LINK_INDEX, dh_mesh, link_poses
 from .model import ArmModel, Joints
-from .ur_models import MODEL_NAMES, arm_model
+from .models import MODEL_NAMES, arm_model
 from .vectors import dot, minus
 
 __all__ = [

@@ -36,7 +36,7 @@ from .speed.speed_reduction import SpeedReduction
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .controller_heartbeat import ControllerHeartbeat
-    from .motion.reaction_motion import ReactionPlanner
+    from .motion.setpoint_stream import ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]

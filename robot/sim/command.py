@@ -15,7 +15,7 @@ from pathlib import Path
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.core.files import read_file
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
 from .compiler import SIMULATOR_MEMORY, bounded_memory

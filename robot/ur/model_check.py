@@ -14,7 +14,7 @@ from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 from .rtde_connection import RtdeConnection
 

@@ -15,7 +15,7 @@ from coneskin.skin.wire import FRAME_LENGTHS, SYNC, VERSION
 
 from .capture import Capture, count_frames, printable_share, short_hex
 from .cause import Cause
-from .checksum import crc16
+from .foreign_checksum import crc16
 
 __all__ = [
     "find_baud",

@@ -12,7 +12,7 @@ from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 
 from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause
-from .checksum import find_checksum
+from .foreign_checksum import find_checksum
 from .foreign_stream import first_line, undo_newlines, undo_slip
 
 __all__ = ["find_damage", "find_foreign_sync", "find_padding", "find_shape"]

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from .geometry.sector import Sector as Sector
     from .geometry.sector import roll_up as roll_up
     from .geometry.sector import unroll as unroll
-    from .robot.arm.ur_models import arm_model as arm_model
+    from .robot.arm.models import arm_model as arm_model
     from .robot.driver.values import Waypoint as Waypoint
     from .robot.guard.signals.journal import EventName as EventName
     from .robot.guard.signals.journal import GuardEvent as GuardEvent
@@ -95,7 +95,7 @@ _PUBLIC = {
     "geometry.pose": "Pose",
     "geometry.sector": "Sector roll_up unroll",
     "runs.replay.run": "Run read_run",
-    "robot.arm.ur_models": "arm_model",
+    "robot.arm.models": "arm_model",
     "robot.driver.values": "Waypoint",
     "robot.guard.signals.journal": "EventName GuardEvent",
     "robot.reaction.rules": "Rule",

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commissioning.examination.doctor import Doctor
+from coneskin.commissioning.examination.examination import Doctor
 from coneskin.commissioning.examination.wires import WirePatch
 from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host

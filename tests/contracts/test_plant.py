@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 
 from coneskin.core.channel import Channel, pair
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.motion.arm import CYCLE

@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.core.errors import Collision, RobotRefused
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.sim.urscript.values import values_of
 from coneskin.session.session import guard

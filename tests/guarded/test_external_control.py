@@ -27,7 +27,7 @@ from .guarded_session import DEADLINE, assert_short_slices, fast, kill, scene_fo
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
 from coneskin.robot.arm.kinematics import forward  # noqa: E402
-from coneskin.robot.arm.ur_models import arm_model  # noqa: E402
+from coneskin.robot.arm.models import arm_model  # noqa: E402
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
 from coneskin.robot.sim.urscript.values import values_of  # noqa: E402
 from coneskin.robot.ur.rtde_connection import RtdeConnection  # noqa: E402

@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.model_check import read_pose
 from coneskin.session.session import guard

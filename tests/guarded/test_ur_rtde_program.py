@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.testing.scenes import START
 

@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 #: the corrections of one real UR10, printed in calibration_test.cpp of Universal_Robots_ROS2_Driver: 440 m along axes
 #: that are parallel to 1.4 mrad

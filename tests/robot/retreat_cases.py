@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 

@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.scene.reader import _check_links
 from coneskin.scene.values.scene import ArmScene, LinkScene, MotionScene, PlacedSensor, Scene
 from coneskin.skin.sensor import Sensor

@@ -13,7 +13,7 @@ import pytest
 import tomli_w
 
 from coneskin.core.errors import SceneError
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.phase import Phase
 from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene

@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_readable
 from coneskin.core.errors import Collision, KinematicsError, RobotConnectionError, RobotRefused
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import Waypoint
 from coneskin.session.arm_client import ArmClient, _ArmRequests
 

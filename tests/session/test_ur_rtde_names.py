@@ -7,7 +7,7 @@ import re
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.ur.ur_rtde import _QUESTION_WORDS
 from coneskin.session import ur_rtde_names
 from coneskin.session.ur_rtde_names import NAMES, REFUSALS, UrRtdeArm

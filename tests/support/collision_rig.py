@@ -19,7 +19,7 @@ from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.values import INTERNAL_PATHS
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
+from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent

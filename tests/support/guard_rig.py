@@ -9,14 +9,14 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
+from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent

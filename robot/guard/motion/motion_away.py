@@ -15,7 +15,7 @@ from coneskin.robot.guard.signals.journal import Outputs
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 if TYPE_CHECKING:  # a reaction that only stops loads it not
-    from .reaction_motion import MotionStream, ReactionPlanner
+    from .setpoint_stream import MotionStream, ReactionPlanner
 
 __all__ = ["MotionAway"]
 

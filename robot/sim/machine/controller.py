@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import IO, Any
 
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantLost
 from coneskin.robot.sim.urscript.translator import Translation

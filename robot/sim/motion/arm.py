@@ -25,8 +25,8 @@ from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 from .plant import KinematicPlant, PlantState
 
 __all__ = [
+    "CONTROLLER_DECELERATION",
     "CYCLE",
-    "DEFAULT_DECELERATION",
     "INVALID_SETPOINT",
     "JOINT_ACCELERATION",
     "MAX_ACCELERATION",
@@ -78,7 +78,7 @@ def _deviation(joint: int) -> StopCause:
 
 
 CYCLE = 0.002  #: control cycle of an e-Series controller [s]
-DEFAULT_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
+CONTROLLER_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
 _STANDSTILL_SPEED = 1e-3  # rad/s; measured speeds up to it count as none: a plant with dynamics never rests entirely
@@ -159,7 +159,7 @@ class SimulatedArm:
             return None
         try:
             if motion is None:
-                q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
+                q, qd = decelerate(self.q, self.qd, CONTROLLER_DECELERATION)
             else:
                 q, qd = motion.update(self, scale, hold)
                 self._check(q, qd)
@@ -168,7 +168,7 @@ class SimulatedArm:
         except (MotionFault, ArithmeticError, ValueError) as exc:  # numbers of a program that are finite, but huge
             fault = exc if isinstance(exc, MotionFault) else MotionFault(INVALID_SETPOINT, str(exc))
             self.motion = None
-            q, qd = decelerate(self.q, self.qd, DEFAULT_DECELERATION)
+            q, qd = decelerate(self.q, self.qd, CONTROLLER_DECELERATION)
         if motion is not None and motion.done:
             self.motion = None
         self.qdd = [(new - old) / CYCLE for new, old in zip(qd, self.qd, strict=True)]
@@ -209,7 +209,7 @@ class SimulatedArm:
                 detail = f"joint {i + 1}: speed {speed:.2f} rad/s above its limit {model.joint_speed[i]:.2f}"
                 raise MotionFault(_NEAR_SINGULARITY if of_tool else INVALID_SETPOINT, detail)
             if speed:
-                rest = q[i] + speed * abs(speed) / (2.0 * DEFAULT_DECELERATION)  # where braking at once would end
+                rest = q[i] + speed * abs(speed) / (2.0 * CONTROLLER_DECELERATION)  # where braking at once would end
                 if (speed > 0.0 and rest > model.joint_upper[i]) or (speed < 0.0 and rest < model.joint_lower[i]):
                     detail = f"joint {i + 1}: position {q[i]:.3f} rad is about to leave its limits"
                     raise MotionFault(_CLOSE_TO_JOINT_LIMITS, detail)

@@ -1,7 +1,7 @@
 """Motions of the simulated arm that follow a speed or a stream of positions, and stops, in steps of 2 ms.
 
 Continuous position and speed, bounded acceleration. Assumed, because no manual says it: the deceleration of a pause, of
-a protective stop and of a program that ends while the arm moves (`DEFAULT_DECELERATION`).
+a protective stop and of a program that ends while the arm moves (`CONTROLLER_DECELERATION`).
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 
 from .arm import (
+    CONTROLLER_DECELERATION,
     CYCLE,
-    DEFAULT_DECELERATION,
     JOINT_ACCELERATION,
     MAX_ACCELERATION,
     SUDDEN_CHANGE,
@@ -52,7 +52,7 @@ class SpeedJoints(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+            return decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
         delta = [scale * a - b for a, b in zip(self.target, arm.qd, strict=True)]
         lead, step = max_abs(delta), self.acceleration * CYCLE
         if lead <= step:
@@ -80,7 +80,7 @@ class SpeedTool(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            q, qd = decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+            q, qd = decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
             self.twist = arm.twist()
             return q, qd
         delta = [scale * a - b for a, b in zip(self.target, self.twist, strict=True)]
@@ -122,7 +122,7 @@ class ServoJoints(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            return decelerate(arm.q, arm.qd, DEFAULT_DECELERATION)
+            return decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
         largest = JOINT_ACCELERATION * CYCLE
         qd = []
         self._check_jump(arm.q)
@@ -156,7 +156,8 @@ class StopJoints:
 
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
-        q, qd = decelerate(arm.q, arm.qd, max(self.deceleration, DEFAULT_DECELERATION) if hold else self.deceleration)
+        rate = max(self.deceleration, CONTROLLER_DECELERATION) if hold else self.deceleration
+        q, qd = decelerate(arm.q, arm.qd, rate)
         self.done = not any(qd)
         return q, qd
 
@@ -169,5 +170,5 @@ class StopTool(StopJoints):
         duration = max(
             math.hypot(*twist[:3]) / max(abs(deceleration), 1e-3), math.hypot(*twist[3:]) / max(abs(angular), 1e-3)
         )
-        rate = max_abs(arm.qd) / duration if duration > 0.0 else DEFAULT_DECELERATION
+        rate = max_abs(arm.qd) / duration if duration > 0.0 else CONTROLLER_DECELERATION
         super().__init__(min(rate, MAX_ACCELERATION / 2.0))

@@ -17,7 +17,15 @@ from coneskin.robot.arm.inverse_kinematics import nearest
 from coneskin.robot.arm.vectors import cross, dot, minus, scaled
 from coneskin.robot.sim.urscript.values import interpolate
 
-from .arm import CYCLE, DEFAULT_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
+from .arm import (
+    CONTROLLER_DECELERATION,
+    CYCLE,
+    INVALID_SETPOINT,
+    JOINT_ACCELERATION,
+    MotionFault,
+    SimulatedArm,
+    max_abs,
+)
 
 __all__ = ["JointLine", "Path", "ToolArc", "ToolLine"]
 
@@ -92,7 +100,7 @@ class Path:
         lead = max_abs(arm.qd)
         brake = profile.acceleration
         if hold and lead > 0.0:
-            brake = max(brake, DEFAULT_DECELERATION * profile.sdot / lead)
+            brake = max(brake, CONTROLLER_DECELERATION * profile.sdot / lead)
         profile.update(0.0 if hold else profile.speed * scale, brake)
 
     def settle(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:
@@ -165,7 +173,7 @@ class _ToolPath(Path):
 
     def _begin(self, arm: SimulatedArm, acceleration: float) -> None:
         """Set where it begins: where the arm would stop, in a blend with the acceleration of the path [m/s^2]."""
-        self.rate = DEFAULT_DECELERATION
+        self.rate = CONTROLLER_DECELERATION
         if arm.blends and (speed := math.hypot(*arm.twist()[:3])) > 0.0:
             self.rate = min(self.rate, max_abs(arm.qd) * max(acceleration, 1e-3) / speed)
         way = _Residual(arm.qd, self.rate).way

@@ -109,7 +109,7 @@ def _make_scene(host: str, reaction: str, soft: bool, folder: Path) -> Scene:
 
 def _half_way(scene: Scene) -> tuple[ArmModel, SensorOnArm, list[float]]:
     """Return the arm, the sensor on it, and the joint positions half way [rad]."""
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
     from coneskin.scene.build import place_on_arm
 
     (placed,) = place_on_arm(scene)

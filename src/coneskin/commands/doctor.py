@@ -18,7 +18,7 @@ from .simulated_arm import simulated_arm
 from .terminal import print_hint
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.examination.doctor import Doctor
+    from coneskin.commissioning.examination.examination import Doctor
     from coneskin.core.finding import Finding
     from coneskin.scene.values.scene import Scene
 
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     scene = load_scene(args.scene)
     if args.check:
         return _check(scene, args.json)
-    from coneskin.commissioning.examination.doctor import Doctor
+    from coneskin.commissioning.examination.examination import Doctor
     from coneskin.core.finding import exit_code
 
     def tell(finding: Finding) -> None:
@@ -112,7 +112,7 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
     Raises:
         SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
     """
-    from coneskin.commissioning.examination.doctor import diff_texts, set_sensor_keys
+    from coneskin.commissioning.examination.examination import diff_texts, set_sensor_keys
     from coneskin.core.files import write_whole
     from coneskin.scene.reader import parse_scene
 

@@ -14,7 +14,7 @@ from coneskin.core.errors import GeometryError, KinematicsError
 from coneskin.core.files import read_file
 from coneskin.core.text import read_json
 from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.firmware.board_circuit import value_text
 

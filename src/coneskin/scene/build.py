@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
-    from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
+    from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
     from coneskin.skin.detection.stream import TouchStream
 
@@ -83,7 +83,7 @@ def withheld_motion(scene: Scene) -> str:
 
 
 def _arm(scene: Scene) -> ArmSupervisor:
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
     from coneskin.robot.driver.registry import load_driver
     from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
@@ -151,7 +151,7 @@ def _angle(a: Vector, b: Vector) -> float:
 
 def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
     from coneskin.robot.arm.workspace import TablePlane
-    from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
+    from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 
     assert scene.arm is not None
     table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)
@@ -236,7 +236,7 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
         index, dh_mesh_frame, dh_frame, arm = 0, Pose(), Pose(), None
         if scene.arm is not None:
             from coneskin.robot.arm.kinematics import dh_link, dh_mesh, link_index
-            from coneskin.robot.arm.ur_models import arm_model
+            from coneskin.robot.arm.models import arm_model
 
             index, arm = link_index(link.name), arm_model(scene.arm.model)
             dh_mesh_frame = dh_mesh(arm, link.name)

@@ -215,7 +215,7 @@ def _check_links(scene: s.Scene, problems: list[str]) -> None:
     Lengths and limits need a known arm; names are the same for all arms.
     """
     from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
 
     arm = None if scene.arm is None else arm_model(scene.arm.model)
     names = {index: name for name, index in LINK_INDEX.items()}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.child_process import spawn
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import REPORT_PERIOD, Heartbeat
 from coneskin.robot.driver.registry import load_driver
 from coneskin.skin.sources.kinds import is_simulated

@@ -15,7 +15,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, wait_readable
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.robot.guard.signals.journal import EventName
 

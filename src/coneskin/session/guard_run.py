@@ -104,7 +104,7 @@ def run_guard(
     source = stack.enter_context(open_source(scene.source.kind, scene.source.settings, start["port"]))
     ports = GuardPorts(session, source, reopen=None if is_simulated(scene.source.kind) else SourceReopening)
     if scene.arm is not None:
-        from coneskin.robot.arm.ur_models import arm_model
+        from coneskin.robot.arm.models import arm_model
         from coneskin.robot.driver.registry import load_driver
 
         if scene.arm.control == "internal":

@@ -48,7 +48,7 @@ _EVENT_MARGIN = 0.5  # s for the events to come, on a busy machine
 
 def braking_time(scene: Scene) -> float:
     """Return the longest time in which the arm of a scene comes to a confirmed standstill after a stop [s]."""
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
 
     assert scene.arm is not None
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, stopping_contact
 from coneskin.scene.commissioning_record import with_commissioning
 from coneskin.scene.reader import load_scene

@@ -265,7 +265,7 @@ class History:
 def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | None:
     if scene.arm is None:
         return None
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
     from coneskin.robot.driver.registry import load_driver
 
     return load_driver(arm_model(scene.arm.model).family).decode_state

@@ -15,7 +15,7 @@ from coneskin.commissioning.touching import Mark
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import dh_mesh, link_pose, link_poses
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.testing.scenes import START, forearm_scene

@@ -2,7 +2,7 @@
 
 import pytest
 
-from coneskin.commissioning.examination.doctor import diff_texts, set_sensor_keys
+from coneskin.commissioning.examination.examination import diff_texts, set_sensor_keys
 from coneskin.core.errors import SceneError
 
 TEXT = """\

@@ -23,7 +23,7 @@ from coneskin.impact.permissible_speed.speed_map import contact_at
 from coneskin.impact.permissible_speed.two_mass_contact import StruckBody
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.materials import Padding
 from coneskin.testing.scenes import forearm_scene

@@ -10,7 +10,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, point_jacobian
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 

@@ -9,7 +9,7 @@ from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.damped_least_squares import damped_speeds, damping_squared
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 
 from ..arms import arms, joints, points, units
 

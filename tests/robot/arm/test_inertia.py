@@ -6,7 +6,7 @@ import pytest
 from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 #: published weights [kg]: user manuals, "Weight", cable not counted
 WEIGHTS = {"UR3": 11.0, "UR5": 18.4, "UR10": 28.9, "UR3e": 11.2, "UR5e": 20.6}

@@ -13,7 +13,7 @@ from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 ANGLE = st.floats(-math.pi, math.pi)
 LAW = settings(max_examples=300)

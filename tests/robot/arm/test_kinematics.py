@@ -24,7 +24,7 @@ from coneskin.robot.arm.kinematics import (
     point_jacobian,
 )
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from tests.robot.arms import FAR_UR10, NEAR_UR10, NOMINAL, arms, joints, points
 from tests.support.paths import SHARED_DATA
 from tests.support.pinocchio_arm import pin_jacobian, pin_place, pin_rotation

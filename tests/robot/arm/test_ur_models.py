@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 
 def test_the_whole_family_is_there() -> None:

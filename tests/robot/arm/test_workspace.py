@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, link_poses
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import (
     _LIMIT_MARGIN,
     _PART_NAMES,
@@ -29,7 +29,7 @@ from coneskin.robot.arm.workspace import (
     reach,
     skeleton,
 )
-from coneskin.robot.reaction.motion import _AdmittanceMotion
+from coneskin.robot.reaction.motion_choice import _AdmittanceMotion
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 from tests.robot.arms import FAR_UR10, arms, joints

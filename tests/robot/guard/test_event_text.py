@@ -130,9 +130,9 @@ def test_what_is_no_retreat_is_not_called_one(name: str, details: dict[str, Any]
 
 def test_the_words_are_those_of_the_robot() -> None:
     assert event_text._END_CAUSE in (ROOT / "robot" / "guard" / "loop.py").read_text(encoding="utf-8")
-    comply = (ROOT / "robot" / "reaction" / "motion.py").read_text(encoding="utf-8")
+    comply = (ROOT / "robot" / "reaction" / "motion_choice.py").read_text(encoding="utf-8")
     assert all(f'"{word}"' in comply for word in (event_text._RELEASE_CAUSE, *event_text._PUSH_LIMITS))
-    others = [path for path in (ROOT / "robot").rglob("*.py") if path.name not in ("motion.py", "event_text.py")]
+    others = [path for path in (ROOT / "robot").rglob("*.py") if path.name not in ("motion_choice.py", "event_text.py")]
     assert not [path.name for path in others if event_text._RELEASE_CAUSE in path.read_text(encoding="utf-8")]
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.contact_supervision import ContactApproach
 from coneskin.robot.reaction.rules import Rule

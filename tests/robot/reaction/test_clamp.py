@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import Workspace
 from coneskin.robot.reaction.backtrack import PathHistory
-from coneskin.robot.reaction.motion import _PlannedMotion, plan_reaction_motion, plan_way_back
+from coneskin.robot.reaction.motion_choice import _PlannedMotion, plan_reaction_motion, plan_way_back
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
 ARM = arm_model("UR5e")

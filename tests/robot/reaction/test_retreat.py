@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.arm.workspace import _LIMIT_MARGIN
 from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction

@@ -11,8 +11,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.ur_models import arm_model
-from coneskin.robot.sim.motion.arm import CYCLE, DEFAULT_DECELERATION, Motion, MotionFault, SimulatedArm, _solve_linear
+from coneskin.robot.arm.models import arm_model
+from coneskin.robot.sim.motion.arm import (
+    CONTROLLER_DECELERATION,
+    CYCLE,
+    Motion,
+    MotionFault,
+    SimulatedArm,
+    _solve_linear,
+)
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
 from coneskin.robot.sim.motion.path import JointLine, ToolLine
 
@@ -115,7 +122,7 @@ def test_a_hold_stops_every_motion_and_its_end_lets_it_go_on(name: str) -> None:
     fast = lead(arm.qd)
     assert fast > 0.01
     motion = arm.motion
-    run(arm, math.ceil(fast / DEFAULT_DECELERATION / CYCLE) + 3, hold=True)
+    run(arm, math.ceil(fast / CONTROLLER_DECELERATION / CYCLE) + 3, hold=True)
     assert lead(arm.qd) < 1e-9
     arm.motion = motion
     run(arm, 40)

@@ -9,7 +9,7 @@ import struct
 import pytest
 
 from coneskin.core.channel import Channel, pair
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import START_Q, Options, RobotMode, SafetyMode
 from coneskin.robot.sim.motion.arm import CYCLE

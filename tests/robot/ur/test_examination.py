@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.core.finding import Finding
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import ExaminationScope
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur.examination import examine

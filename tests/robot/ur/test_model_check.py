@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur.model_check import _ArmPose, _flange_distance, check_model, read_pose
 from tests.support.served_controller import served

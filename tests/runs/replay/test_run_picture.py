@@ -9,7 +9,7 @@ import pytest
 from coneskin.core.errors import MissingExtra, RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.ur.rtde_codec import Recipe
 from coneskin.runs.replay.run import Run, read_run

@@ -9,8 +9,8 @@ from coneskin.core.finding import Finding
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.diagnosis.capture import Capture, CaptureWindow
 from coneskin.skin.diagnosis.cause import Cause
-from coneskin.skin.diagnosis.checksum import crc16
 from coneskin.skin.diagnosis.diagnose import diagnose
+from coneskin.skin.diagnosis.foreign_checksum import crc16
 from coneskin.skin.diagnosis.frame_numbers import measure_numbers
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections

@@ -10,7 +10,7 @@ import pytest
 
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import LINK_INDEX, link_poses
-from coneskin.robot.arm.ur_models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene

@@ -15,7 +15,7 @@ from coneskin.commissioning.skin_watch import TouchSession
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import RobotRefused, RobotTimeout
 from coneskin.core.version import __version__
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.registry import load_driver
 from coneskin.scene.commissioning_record import CommissioningRecord, fingerprint
 from coneskin.scene.values.scene import Commissioning, Scene

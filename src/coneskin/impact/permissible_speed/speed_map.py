@@ -22,7 +22,7 @@ from coneskin.core.errors import SceneError
 from coneskin.core.files import write_whole
 from coneskin.core.version import __version__
 from coneskin.robot.arm.kinematics import link_index
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.scene.tables.keys import SPEED_LIMIT_KEYS
 from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerprint
 from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene

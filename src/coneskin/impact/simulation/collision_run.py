@@ -22,7 +22,7 @@ from coneskin.core.arrays import Floats
 from coneskin.core.recording.block import Block
 from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetSpeedSlider, StopPath
 from coneskin.robot.guard.phase import Phase

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coneskin.core.errors import SceneError
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
 from coneskin.scene.build import place_on_arm

@@ -18,7 +18,7 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 from coneskin.core.progress import Progress, silent
 from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands

@@ -226,7 +226,7 @@ class Run:
                     yield block.time, driver.decode_speed_fraction(block.payload)
 
     def _driver(self) -> ArmDriver | None:
-        from coneskin.robot.arm.ur_models import arm_model
+        from coneskin.robot.arm.models import arm_model
         from coneskin.robot.driver.registry import load_driver
 
         arm = self.scene().arm

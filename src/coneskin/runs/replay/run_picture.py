@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import GuardEvent, stopping_contact
 from coneskin.scene.values.scene import Scene

@@ -39,7 +39,7 @@ def read_arm(tables: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
         return None
     values = check(tables["arm"], k.ARM_KEYS, "arm", problems)
     if "model" in values:
-        from coneskin.robot.arm.ur_models import arm_model
+        from coneskin.robot.arm.models import arm_model
 
         try:
             values["model"] = arm_model(values["model"]).name

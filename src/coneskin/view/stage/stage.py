@@ -170,7 +170,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     bodies, starts = tuple(body_solids(scene.bodies)), tuple(place for body in scene.bodies for place in body.parts)
     if scene.arm is None:
         return Stage(title, None, (), sheets, bodies, starts)
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
 
     from .solids import arm_solids
 

@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.robot.driver.values import ControllerState
-from coneskin.robot.guard.motion.reaction_motion import _FollowingErrorMonitor
+from coneskin.robot.guard.motion.setpoint_stream import _FollowingErrorMonitor
 from coneskin.robot.reaction.types import JointVelocity
 
 REST = (0.0,) * 5

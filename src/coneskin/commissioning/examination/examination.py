@@ -236,7 +236,7 @@ def _latency_timer(source: SourceScene, opened: Source) -> Finding:
 
 
 def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
-    from coneskin.robot.arm.ur_models import arm_model
+    from coneskin.robot.arm.models import arm_model
     from coneskin.robot.driver.protocol import ExaminationScope
     from coneskin.robot.driver.registry import load_driver
 

@@ -17,7 +17,7 @@ from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
 from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_way, emit
 from coneskin.robot.reaction.backtrack import PathHistory
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
-from coneskin.robot.reaction.motion import ReactionMotion, plan_reaction_motion, plan_way_back
+from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_motion, plan_way_back
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.ur_models import arm_model
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import _LIMIT_MARGIN, TablePlane, Workspace, skeleton
 from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
-from coneskin.robot.reaction.motion import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
+from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import pytest
 
-from coneskin.commissioning.examination.doctor import Doctor, set_sensor_keys
+from coneskin.commissioning.examination.examination import Doctor, set_sensor_keys
 from coneskin.commissioning.examination.wires import touch_places
 from coneskin.core.finding import Finding
 from coneskin.scene.reader import parse_scene
