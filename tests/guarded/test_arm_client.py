@@ -156,6 +156,7 @@ def fast_enough(controller):
 
 
 STREAMS = {
+    "speed_j": lambda arm: arm.speed_j([0.4, 0, 0, 0, 0, 0], 4.0),
     "servo_j": lambda arm: arm.servo_j([START[0] + 0.3, *START[1:]], 0.2),
     "servo_l": lambda arm: arm.servo_l(ahead(-0.1), 0.1, gain=100),
     "speedL of ur_rtde": lambda arm: arm.speedL([-0.2, 0, 0, 0, 0, 0], 3.0),
@@ -164,6 +165,7 @@ STREAMS = {
 
 @pytest.mark.promise("P51")
 def test_a_program_that_falls_silent_does_not_move_its_arm_on(controller, session):
+    """Its main thread hangs, or forgets; its heartbeat goes on."""
     for name, command in STREAMS.items():
         began = len(session.events)
         moved = has_moved(controller, controller.state()["q"])
