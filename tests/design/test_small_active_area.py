@@ -39,6 +39,7 @@ def test_what_is_advised_for_a_short_sheet_leaves_what_is_said():
     assert along == pytest.approx(25.0 - 2.0 * (6.0 + 6.0))  # two margins and two electrodes, of the paper's widths
     assert share == pytest.approx(100.0 * along / slant * around / wrap, abs=0.05)
     assert active == pytest.approx(0.01 * share * whole, abs=0.06)
+    assert (margin, electrode, lead, hole) == (3.0, 3.0, 3.0, 0.0)  # half of them; a lead of 4 mm is no wider than one
     plan = ElectrodePlan(margin=1e-3 * margin, electrode=1e-3 * electrode, lead=1e-3 * lead, hole=1e-3 * hole)
     advised = design_of(0.036, 0.025, plan)
     assert advised.layout.active_share == pytest.approx(0.01 * left, abs=0.005)

@@ -1,5 +1,6 @@
 """The arm under the names of ur_rtde: every public method of the wheel is there or refused."""
 
+import ast
 import importlib.util
 import inspect
 import re
@@ -37,7 +38,7 @@ def test_every_public_method_of_the_wheel_is_there_or_refused_and_nothing_else_i
 
 
 def test_arguments_have_the_wheel_s_names(wheel) -> None:
-    """As far as the wheel names them; a question hands on what it gets."""
+    """And its defaults, as far as the wheel names them; a question hands on what it gets."""
     import rtde_control
 
     compared = 0
@@ -48,8 +49,10 @@ def test_arguments_have_the_wheel_s_names(wheel) -> None:
             wheel = re.findall(r"(\w+): ", signature)
             if any(word.startswith("arg") for word in wheel) or wheel[0] == "path":
                 continue
-            ours = list(inspect.signature(NAMES[name].call).parameters)[1:]
-            assert ours[: len(wheel)] == wheel, name
+            ours = dict(list(inspect.signature(NAMES[name].call).parameters.items())[1:])
+            assert list(ours)[: len(wheel)] == wheel, name
+            for argument, value in re.findall(r"(\w+): \w+ = ([^,]+)", signature):
+                assert ours[argument].default == ast.literal_eval(value), (name, argument)
             compared += 1
     assert compared >= 10
 

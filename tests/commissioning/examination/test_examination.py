@@ -81,7 +81,7 @@ def right() -> Doctor:
 
 def test_a_right_skin_is_found_right() -> None:
     doctor = right()
-    assert {one.verdict for one in doctor.findings} == {"ok"}
+    assert {(one.verdict, one.remedy) for one in doctor.findings} == {("ok", "")}
     assert doctor.patches == []
     assert finding(doctor, "skin, rate").value == "250 frames/s"
     assert finding(doctor, "line").value == "250 frames/s take 78 % of 115200 baud"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
+from coneskin.design.design_toml import DESIGN_TABLES
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import LOOP, BuildFigures, _cable_exit, measure_build
@@ -99,8 +100,13 @@ def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: floa
         else:
             across = abs(wire.u - cable.u)
         assert 0.0 < wire.length - (across + 0.06 + LOOP) < 0.02
+    assert cable.tie == 0.03, "half way to the connector"
+    (least,) = (1e-3 * key.low for key in DESIGN_TABLES["sheet"][1] if key.name == "connector_mm")
+    assert _cable_exit(layout, least).connector == least, "design.toml allows what the cable allows, and no more"
     with pytest.raises(GeometryError, match="the connector must be 30 to 2000 mm from the rim, got 1 mm"):
         _cable_exit(layout, 1e-3)
+    with pytest.raises(GeometryError):
+        _cable_exit(layout, least - 1e-6)
 
 
 def bumped(azimuth: float | None) -> Mesh:
@@ -219,6 +225,7 @@ def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> 
     assert "Write the measured sheets into `sheet-2/sensor.toml`" in text
     ab, cd = figures.pairs
     assert cd.ohms / cd.squares < 0.5 * cd.sheet_ohms
+    assert "ohm per square (lower, upper), within 20%." in text
     assert f"gives {ab.ohms / ab.squares:.4g} and {cd.ohms / cd.squares:.4g}" in text
 
 
@@ -287,6 +294,10 @@ def test_the_bill_has_what_the_steps_use_up() -> None:
     assert float(strap.split()[-2]) > 2e3 * math.pi * 0.05
     sheet = next(item for name, item in items.items() if name.startswith("conductive sheet"))
     assert "a strip of 20 x 120 mm to measure" in sheet.quantity, "step 2 measures a strip of it"
+    faces = sum(part.area for cut in design.cuts if cut.number in (1, 3, 5) for part in cut.parts)
+    rims = 2.0 * (2.0 * 0.2 + 2.0 * math.pi * (0.05 + 0.05))  # m, around part 4, on both its faces
+    (tape,) = (item.quantity for name, item in items.items() if name.startswith("double-sided silicone adhesive"))
+    assert tape == f"{1e4 * 1.15 * (faces + 0.003 * rims):.0f} cm2", "strips of 3 mm, and 15 % for offcuts"
     text = guide(design, figures)
     assert "hook-and-loop tape" in text
     assert "isopropanol" in text

@@ -193,6 +193,14 @@ def test_active_area_of_a_cylinder_by_hand():
     assert layout.active.phi1 == pytest.approx(layout.field.phi1, rel=1e-14)
 
 
+def test_tabs_of_a_cylinder_by_hand():
+    """From edge 0: a setback of 1 mm and half a lead of 4 mm, a clearance of 1.5 mm, A's lead, two clearances, B's."""
+    layout = lay_out_sheet(Frustum(0.054, 0.054, 0.434))
+    middles = {name: 0.5 * 54 * sum(corner.phi for corner in fold) for name, fold in layout.folds.items()}
+    middle_of_c = 2 * math.pi * 54 - 6 - 6 + 0.5 * 6  # margin and half an electrode before edge 1
+    assert middles == pytest.approx({"D": 1 + 2, "A": 6.5 + 2, "B": 6.5 + 4 + 1.5 + 1.5 + 2, "C": middle_of_c})
+
+
 def test_a_wide_lead_costs_active_area_but_not_the_field():
     plan = ElectrodePlan(electrode=6e-3, lead=6e-3, clearance=3e-3)
     layout = lay_out_sheet(Frustum(0.054, 0.054, 0.434), plan)

@@ -77,7 +77,13 @@ EXAMPLES: dict[str, dict[str, str]] = {
     "state of the arm": {
         "get_actual_joint_accelerations": "norm(get_actual_joint_accelerations()) == 0",
         "get_actual_joint_positions": "length(get_actual_joint_positions()) == 6",
-        "get_actual_joint_positions_history": "get_actual_joint_positions_history(3) == get_actual_joint_positions()",
+        "get_actual_joint_positions_history": (
+            "speedj([0.5, 0, 0, 0, 0, 0], 5, 0.1)\n"
+            "before = get_actual_joint_positions()\n"
+            "sync()\n"
+            "sync()\n"
+            "get_actual_joint_positions_history(2) == before and before != get_actual_joint_positions()"
+        ),
         "get_actual_joint_speeds": "norm(get_actual_joint_speeds()) == 0",
         "get_actual_tcp_pose": "pose_dist(get_actual_tcp_pose(), get_forward_kin()) == 0",
         "get_actual_tcp_speed": "norm(get_actual_tcp_speed()) == 0",

@@ -126,7 +126,9 @@ def test_a_silent_guard_counts_as_dead(driver, now):
     now[0] += 0.02
     served.poll(0.0)
     assert stops(made.control)[-1] == "stopJ"
-    assert "silent" in answers(program)[0]["why"]
+    (answer,) = answers(program)
+    assert (answer["ok"], answer["stopped"]) == (False, True)
+    assert "silent" in answer["why"]
     assert "silent" in StatusReport.decode(guard.receive()[-1]).text
     guard.send(Heartbeat().encode())
     move(program, now[0])

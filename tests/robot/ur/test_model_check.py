@@ -10,6 +10,7 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.process import free_host
+from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.robot.ur.model_check import _ArmPose, _flange_distance, check_model, read_pose
 from tests.support.served_controller import served
 
@@ -69,5 +70,6 @@ def test_the_simulated_controller_is_asked():
     with served(model="ur10e", start_q=Q) as simulated:
         pose = read_pose(simulated.host, 30.0)
         check_model(arm_model("UR10e"), pose, simulated.host)
+        UR_DRIVER.check_model(arm_model("UR10e"), simulated.host)
         with pytest.raises(RobotRefused, match=r"is no UR5e: its flange is .* mm .* UR10e"):
-            check_model(arm_model("UR5e"), pose, simulated.host)
+            UR_DRIVER.check_model(arm_model("UR5e"), simulated.host)

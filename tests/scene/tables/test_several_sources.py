@@ -31,7 +31,7 @@ port = "/dev/ttyUSB0"
 [[source]]
 kind = "serial"
 port = "/dev/ttyUSB1"
-baud = 115200
+baud = 1200
 """
 #: a row that a package of somebody else's might bring
 BUS = SourceKind("coneskin.skin.sources.serial_port:SerialPort", (Key("port", str, meaning="a bus"),))
@@ -44,7 +44,7 @@ def test_two_ports_are_read_as_one() -> None:
     assert scene.source.kind == GROUP
     assert scene.source.settings["members"] == (
         ("serial", {"port": "/dev/ttyUSB0", "baud": 921600}),
-        ("serial", {"port": "/dev/ttyUSB1", "baud": 115200}),
+        ("serial", {"port": "/dev/ttyUSB1", "baud": 1200}),
     )
     assert summarize(scene)["source"] == "serial /dev/ttyUSB0 + serial /dev/ttyUSB1"
     source = open_source(scene.source.kind, scene.source.settings)
@@ -61,12 +61,12 @@ def test_a_list_of_one_is_that_one() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("baud = 115200", "baud = 10", "source 2.baud"),
+        ("baud = 1200", "baud = 1199", "source 2.baud"),
         ('port = "/dev/ttyUSB1"\n', "", "source 2.port is missing: a device such as"),
         ("USB1", "USB0", None),
-        ('USB1"\nbaud = 115200', 'USB0"', "source 2 is the same as another one: no port can be read twice"),
+        ('USB1"\nbaud = 1200', 'USB0"', "source 2 is the same as another one: no port can be read twice"),
         (
-            'kind = "serial"\nport = "/dev/ttyUSB1"\nbaud = 115200',
+            'kind = "serial"\nport = "/dev/ttyUSB1"\nbaud = 1200',
             'kind = "virtual"',
             "source 2: a virtual skin",
         ),

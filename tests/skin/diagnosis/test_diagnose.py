@@ -43,6 +43,8 @@ def test_a_mistake_is_named(program: Path, mistake: str) -> None:
     named = heard(program, mistake, (SENSOR,) if mistake in WITH_A_SCENE else ())
     assert named.item == {**MISTAKES, **NOT_TO_BE_NAMED}[mistake].key, named.line
     assert "\n" not in named.line
+    if mistake == "only a banner":
+        assert "; before, the device wrote " in named.value
 
 
 @pytest.mark.parametrize("mistake", ["none", "big endian", "supply 0", "currents 0", "shifted to 16 bits"])
@@ -68,6 +70,10 @@ def test_a_line_of_two_seconds_is_not_kept_for_ever() -> None:
         window.feed(bytes(10), 0.01 * number)
     assert len(window.capture(5.0).data) == 1000
     assert len(CaptureWindow(0.0).capture(3.0).data) == 0
+    window = CaptureWindow(0.0, span=2.0)
+    for second in range(5):
+        window.feed(bytes([second]), float(second))
+    assert window.capture(4.0).data == bytes([2, 3, 4])
 
 
 def test_a_capture_knows_when_each_byte_came() -> None:

@@ -56,6 +56,8 @@ def test_an_emergency_stop_ends_everything_until_power_is_back(bench: Bench) -> 
     for line in ("restart safety", "power on", "brake release"):
         bench.dashboard(line)
     assert bench.dashboard("robotmode") == "Robotmode: RUNNING"
+    bench.dashboard("restart safety")
+    assert bench.dashboard("robotmode") == "Robotmode: RUNNING", "there is nothing to end"
 
 
 JUMPS = {
