@@ -93,6 +93,7 @@ def test_a_recording_carries_the_numbers_and_names_no_file(tmp_path: Path) -> No
             "made with another geometry, wiring or electronics",
         ),
         ({"simulated": False}, NAMED, "no calibration of the virtual sensor 0"),
+        ({"simulated": False}, NAMED.replace("[source]", "[[source]]"), "no calibration of the virtual sensor 0"),
         ({"sensor": 3}, NAMED, "no calibration of the virtual sensor 0"),
         ({}, NAMED.replace("device = 7", "device = 8"), "there is no calibration"),
         ({"map_along": (0.06, 0.0, 0.0, 0.0, 0.0)}, NAMED, "place_map.along must be 5 numbers of at most 0.05"),

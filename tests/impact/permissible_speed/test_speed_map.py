@@ -40,6 +40,8 @@ def test_the_masses_are_those_of_the_mass_matrix() -> None:
     scene = parse_scene(SCENE)
     patches = patches_of(scene)
     assert len(patches) == 48
+    cone = scene.sensors[0].sensor.frustum
+    assert (min(patch.u for patch in patches), max(patch.u for patch in patches)) == (0.0, cone.slant)
     model, q = arm_model("UR5e"), scene.motion.waypoints[0] if scene.motion else ()
     found = weigh(arm_model("UR5e"), patches, [q])[0]
     for patch, mass in list(zip(patches, found, strict=True))[::7]:

@@ -1,6 +1,7 @@
 """The loop's clock: whatever else talks, the core hears that time passes."""
 
 import socket
+from types import SimpleNamespace
 
 import pytest
 
@@ -90,6 +91,15 @@ def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(end
     loop.poll(0.0)
     assert core.taken == [BlockKind.SUSPENDED, BlockKind.TICK]
     loop._close()
+
+
+@pytest.mark.pure  # its core is a stub
+@pytest.mark.parametrize(("descriptor", "timeout"), [(7, 0.0), (None, 0.002)])
+def test_a_skin_is_waited_for_only_where_no_descriptor_tells_that_it_has_bytes(ends, descriptor, timeout):
+    core, skin = Core(), SimpleNamespace(fileno=lambda: descriptor, read=lambda timeout: asked.append(timeout) or b"x")
+    asked = []
+    GuardLoop(core, GuardPorts(ends[0], skin))._read_skin(skin)
+    assert (asked, core.taken) == ([timeout], [BlockKind.SKIN])
 
 
 def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):

@@ -4,6 +4,7 @@ import pytest
 
 from coneskin.core.errors import SceneError, SensorError
 from coneskin.scene.reader import parse_scene
+from coneskin.scene.values.scene import ArmScene
 from coneskin.skin.materials import Padding
 
 ARM = '[arm]\nmodel = "UR5e"\nhost = "127.0.0.1"\n'
@@ -19,6 +20,7 @@ def test_a_body_is_read_in_si() -> None:
 
 def test_a_scene_without_bodies_has_none_and_padding_is_the_assumed_one() -> None:
     scene = parse_scene(ARM)
+    assert scene.arm == ArmScene("UR5e", "127.0.0.1"), "what a table leaves out is as its class has it"
     assert (scene.bodies, scene.padding) == ((), None)
     assert parse_scene(ARM + "[padding]\n").padding == Padding()
     assert parse_scene(ARM + "[padding]\nthickness_mm = 8\n").padding == Padding(thickness=8e-3)
