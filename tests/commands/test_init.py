@@ -137,8 +137,9 @@ def test_a_link_longer_than_the_arms_is_of_another_arm(
 
 
 def test_a_skin_alone_has_no_arm(here: Path) -> None:
-    assert main(["init", "skin", "--skin-only", "--simulated"]) == 0
+    assert main(["init", "skin", "--skin-only", "--simulated", "--link", "gripper"]) == 0  # a link of no arm of UR's
     scene = load_scene(here / "scene.toml")
+    assert scene.links[0].name == "gripper"
     assert (scene.arm, scene.motion, len(scene.sensors)) == (None, None, 1)
 
 

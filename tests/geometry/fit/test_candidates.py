@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.candidates import find_axis_candidates
+from coneskin.geometry.fit.candidates import _cylinders, find_axis_candidates
 
 from ..synthetic import frustum, rugby, shoulder
 from .axis_cases import hull
@@ -31,6 +31,12 @@ def test_candidates_are_told_apart() -> None:
                 tilt = np.linalg.norm(np.cross(cone.axis, one.axis))
                 assert tilt < 0.002
                 assert cone.axis @ one.axis > 0.0
+
+
+def test_two_normals_of_a_cylinder_give_its_radius() -> None:
+    _, _, radius, _ = _cylinders(hull(frustum(0.05, 0.05, 0.3), 2000), np.random.default_rng(1))
+    assert len(radius) > 1000
+    assert np.mean(np.abs(radius / 0.05 - 1.0) < 0.1) > 0.9  # the others have a point of an end, or near the border
 
 
 @pytest.mark.long
