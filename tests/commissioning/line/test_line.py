@@ -30,7 +30,8 @@ def test_the_file_of_a_sensor_has_no_line(tmp_path: Path) -> None:
 
 
 def test_a_scene_has_the_line_of_its_source(tmp_path: Path) -> None:
-    file, link = tmp_path / "scene.toml", '[[link]]\nname = "tube"\n[[link.sensor]]\nheight_mm = 100\nradius1_mm = 50\nradius2_mm = 50\n'
+    file = tmp_path / "scene.toml"
+    link = '[[link]]\nname = "tube"\n[[link.sensor]]\nradius1_mm = 50\nradius2_mm = 50\nheight_mm = 100\n'
     file.write_text(link)
     with pytest.raises(SceneError, match=r"there is no \[source\], so there is no line to listen to"):
         find_line(str(file), 921600)
