@@ -108,7 +108,7 @@ def pixels(page: Any, at: tuple[int, int], around: int = 5) -> np.ndarray:
 
 
 def magenta(found: np.ndarray) -> int:
-    """How many of some pixels have the colour of a contact whose place is certain; a touched sheet is red."""
+    """How many of some pixels have the colour of a contact whose place is certain."""
     red, green, blue = found.T
     return int(((red > 90) & (green < 0.6 * red) & (blue > 0.75 * red)).sum())
 
@@ -116,7 +116,17 @@ def magenta(found: np.ndarray) -> int:
 def quiet(found: np.ndarray) -> int:
     """How many of some pixels have the colour of a sheet that nothing touches."""
     red, green, blue = found.T
-    return int(((green > 1.3 * red) & (green > blue)).sum())
+    return int(((blue > 1.2 * green) & (green > red) & (blue < 110)).sum())
+
+
+def shown_trace(page: Any) -> np.ndarray:
+    """How far below the upper edge the trace is in each column of pixels, as a share of the height; NaN: nowhere."""
+    from PIL import Image
+
+    drawn = page.query_selector(".coneskin-plot svg").screenshot()
+    red, green, blue = np.moveaxis(np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB")).astype(int), 2, 0)
+    line = (blue > red + 60) & (blue > green + 30)
+    return np.where(line.any(axis=0), line.argmax(axis=0) / len(line), np.nan)
 
 
 def violet(found: np.ndarray) -> int:

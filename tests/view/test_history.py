@@ -11,7 +11,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEven
 from coneskin.runs.replay.run import read_run
 from coneskin.view.contact_mark import FADING, ContactLog
 from coneskin.view.history import UNKNOWN, History, PhaseWords, _phase_after
-from coneskin.view.panel import event_list, status, timeline
+from coneskin.view.panel import event_list, state_of, status, timeline
 from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.traces import _trace_names, traces
 from tests.support.paths import COLLISION
@@ -45,7 +45,7 @@ def test_the_sheet_is_touched_while_the_touch_lasts(course: RunCourse) -> None:
     assert course.history.level(sheet.name, began.time + 0.01) > sheet.touch_level
 
 
-def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(course: RunCourse) -> None:
+def test_the_mark_is_where_the_touch_was_read_and_stays_while_it_holds_the_arm(course: RunCourse) -> None:
     began, located = event(course, EventName.CONTACT), event(course, EventName.CONTACT_LOCATED)
     assert course.history.contacts.marks(began.time - 0.001) == []
     (mark,) = course.history.contacts.marks(located.time)
@@ -54,8 +54,7 @@ def test_the_mark_is_where_the_touch_was_read_and_fades_when_it_is_over(course: 
     assert mark.located
     assert mark.strength == 1.0
     over = event(course, EventName.TOUCH_ENDED).time
-    assert course.history.contacts.marks(over + 0.5 * FADING)[0].strength == pytest.approx(0.5)
-    assert course.history.contacts.marks(over + FADING) == []
+    assert course.history.contacts.marks(over + 100.0 * FADING)[0].strength == 1.0, "it holds the arm"
 
 
 def touch(name: EventName, time: float, number: int = 1, **details: object) -> GuardEvent:
@@ -116,9 +115,11 @@ def test_a_page_that_follows_does_not_grow(course: RunCourse) -> None:
 
 def test_what_a_recording_says_is_never_taken_for_html() -> None:
     evil = '<img src=x onerror="alert(1)">'
-    run = [(evil, PhaseWords(evil, "#000000"), evil)]
+    course = read_courses([RUN])[0]
     fault = GuardEvent(EventName.FAULT, 0.0, {"what": evil})
-    for text in (status(run * 2, evil, evil), event_list([(fault, evil)], 0)):
+    course.history.events[:] = [fault]
+    run = [(evil, PhaseWords(evil, "active"), state_of(course, 1.0))]
+    for text in (status(run * 2), state_of(course, 1.0), event_list([(fault, evil)], 0)):
         assert "<img" not in text
         assert "&lt;img" in text
 

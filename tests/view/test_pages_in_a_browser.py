@@ -1,9 +1,12 @@
 """What a person sees in a browser: the phase in words, the contact where it was, and that nobody may rely on it."""
 
 import json
+import threading
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
+import numpy as np
 import pytest
 
 from coneskin.core.recording.block import Block
@@ -18,7 +21,18 @@ from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.run_page import show_runs
 from tests.support.paths import COLLISION
 
-from .browser import browser_page, look_closely, look_closely_at_a_file, magenta, pixels, quiet, violet, wait_for_text
+from .browser import (
+    SIZE,
+    browser_page,
+    look_closely,
+    look_closely_at_a_file,
+    magenta,
+    pixels,
+    quiet,
+    shown_trace,
+    violet,
+    wait_for_text,
+)
 
 RUN = COLLISION
 NOTICE = "No safety display"
@@ -49,7 +63,7 @@ def test_a_recording_is_scrubbed_to_its_touch() -> None:
         forward = page.get_by_role("button", name=">", exact=True)
         for words in ("activated", "stop: touch"):
             forward.click()
-            wait_for_text(page, "#coneskin-events div[style*='700']", words if words == "activated" else "touch on")
+            wait_for_text(page, "#coneskin-events div.now", words if words == "activated" else "touch on")
         wait_for_text(page, ".coneskin-phase", "stopping")
         forward.click()
         wait_for_text(page, "#coneskin-clock", "2.970 s")
@@ -113,33 +127,72 @@ def test_a_file_shows_the_contact_where_it_was_when_it_was(tmp_path: Path) -> No
         assert page.wrong == []
 
 
-def test_a_page_follows_a_recording_that_grows(tmp_path: Path) -> None:
+def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_path: Path) -> None:
+    """What it says is held against the guard's own record: place, paths, distance, and the trace by its pixels."""
     run = read_run(RUN)
     blocks = list(run.blocks)
     path = tmp_path / "run.rec"
-    located, point, normal = contact(read_courses([RUN])[0])
+    course = read_courses([RUN])[0]
+    located, point, normal = contact(course)
     with Recorder(path) as recorder, PageServer("live", port=18180) as server, browser_page() as page:
+
+        def write_until(time: float, since: float = 0.0) -> None:
+            recorder.write(*(b for b in blocks if run.start + since <= b.time < run.start + time), flush=True)
+
+        def serve() -> None:
+            while not over.wait(0.03):
+                if alive.is_set():
+                    live._grown = monotonic()  # as if ticks came all the time
+                shown.poll(monotonic())
+                shown.draw(monotonic())
+
         recorder.write(Block(BlockKind.HEADER, run.start, json.dumps(run.header).encode()), flush=True)
-        before = [block for block in blocks if block.time < run.start + located - 0.1]
-        recorder.write(*before, flush=True)
         live = LiveRun(path)
-        shown = LivePage(server, live.course.stage, lambda: live)
-        shown.poll(0.0)
-        shown.draw(0.0)
+        shown = LivePage(server, live.course.stage, lambda before: live if before is None else None)
+        over, alive = threading.Event(), threading.Event()
+        alive.set()
+        threading.Thread(target=serve, daemon=True).start()
+        write_until(located - 0.1)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-notice", NOTICE)
-        wait_for_text(page, ".coneskin-phase", "active")
+        wait_for_text(page, ".coneskin-phase.active", "active")
+        wait_for_text(page, "#coneskin-legend", "Dark blue: a sheet of skin")
         place = look_closely(server, page, point, normal)
-        recorder.write(*(b for b in blocks if run.start + located - 0.1 <= b.time <= run.start + located), flush=True)
-        assert shown.poll(1.0), "an event has come"
-        shown.draw(1.0)
-        wait_for_text(page, ".coneskin-phase", "stopping")
-        wait_for_text(page, "#coneskin-events", "touch located")
+        assert quiet(pixels(page, place)) > 50
+        assert magenta(pixels(page, place)) == 0
+        write_until(located + 1e-6, located - 0.1)
+        wait_for_text(page, ".coneskin-phase.stopped", "stopping")
+        wait_for_text(page, ".coneskin-card", "u = 130.0 mm, phi = 89.0 deg")
         assert magenta(pixels(page, place)) > 5
-        assert quiet(pixels(page, place, 40)) == 0
-        assert page.wrong == []
+        assert quiet(pixels(page, place, 40)) > 50, "where it was is marked, not the whole sheet"
+        write_until(3.842, located + 1e-6)
+        for said in ("latched: stands until a manual reset", "driver, stands after 107 ms", "retreated 19.5 mm"):
+            wait_for_text(page, "body", said)
+        page.evaluate("document.querySelector('.coneskin-plot').scrollIntoView()")
+        since, until = (float(page.get_attribute(".coneskin-plot", f"data-{end}")) for end in ("since", "until"))
+        seen = np.flatnonzero(shown_trace(page) < 0.5)
+        levels = course.history.levels["forearm skin"]
+        high = [t - run.start for t, (level,) in zip(levels.times, levels.values, strict=True) if level > 0.5]
+        width = len(shown_trace(page))
+        assert since + (until - since) * seen[0] / width == pytest.approx(high[0], abs=0.03)
+        assert since + (until - since) * seen[-1] / width == pytest.approx(high[-1], abs=0.03)
+        box = page.query_selector(".coneskin-plot").bounding_box()
+        page.mouse.move(box["x"] + 0.5 * (seen[0] + seen[-1]), box["y"] + 30.0)
+        wait_for_text(page, ".coneskin-read", "forearm skin 0.")
+        page.set_viewport_size({"width": 390, "height": 800})
+        wait_for_text(page, "#coneskin-top", "u = 130.0 mm")
+        assert page.is_visible("#coneskin-top .coneskin-phase")
+        page.set_viewport_size(SIZE)
+        over.set()
+        wait_for_text(page, "#coneskin-stale", "NOTHING NEW from the page's server")
+        over.clear()
+        alive.clear()
+        threading.Thread(target=serve, daemon=True).start()
+        wait_for_text(page, "#coneskin-stale", "NOTHING NEW from the guard")
+        assert page.inner_text("#root .coneskin-phase").startswith("was latched: stands until a manual reset, ")
+        assert magenta(pixels(page, look_closely(server, page, point, normal))) == 0, "the scene has faded"
         recorder.close()
-        shown.poll(2.0)
-        shown.draw(2.0)
         wait_for_text(page, "#coneskin-stale", "the run is over")
+        over.set()
         shown.close()
+        assert page.wrong == []

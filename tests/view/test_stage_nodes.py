@@ -112,7 +112,7 @@ def test_a_live_page_moves_bodies_with_the_arm(tmp_path: Path) -> None:
         scene=Scene(), gui=MagicMock(), look_from=lambda *_: None, on_viewer=lambda _: None, together=nullcontext
     )
     live = LiveRun(recorded(tmp_path, (101.0, PUSHED), (109.96, STARTS)))
-    page = LivePage(server, live.course.stage, lambda: live)  # type: ignore[arg-type]
+    page = LivePage(server, live.course.stage, lambda _: live)  # type: ignore[arg-type]
     assert server.scene.middles("/run") == near(STARTS)
     page.poll(0.0)
     page.draw(0.0)
@@ -123,7 +123,7 @@ def test_a_live_page_moves_bodies_with_the_arm(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("ended", "silence", "follows"), [(False, 29.0, False), (False, 31.0, True), (True, 0.0, True), (True, 31.0, True)]
+    ("ended", "silence", "follows"), [(False, 0.9, False), (False, 1.1, True), (True, 0.0, True), (True, 31.0, True)]
 )
 def test_a_live_page_follows_the_next_run_once_its_own_has_ended_or_is_silent(
     ended: bool, silence: float, follows: bool, tmp_path: Path
@@ -134,7 +134,7 @@ def test_a_live_page_follows_the_next_run_once_its_own_has_ended_or_is_silent(
         MagicMock(course=course, ended=over, silence=quiet) for over, quiet in ((ended, silence), (False, 0.0))
     )
     runs = [own, following]
-    page = LivePage(server, course.stage, lambda: runs.pop(0))  # type: ignore[arg-type]
+    page = LivePage(server, course.stage, lambda _: runs.pop(0))  # type: ignore[arg-type]
     page.poll(0.0)
     assert page.poll(1.0) is follows
     assert own.close.called is follows

@@ -104,7 +104,7 @@ def _follow_run(args: argparse.Namespace, recording: Path) -> int:
     first = LiveRun(recording)
     runs = [first]
 
-    def find() -> LiveRun | None:
+    def find(_before: LiveRun | None) -> LiveRun | None:
         return runs.pop() if runs else None
 
     return _follow(args, first.course.stage, find)
@@ -126,14 +126,14 @@ def _follow_scene(args: argparse.Namespace, path: Path) -> int:
         )
     folder = None if scene.recording is None else scene.recording.folder
 
-    def find() -> LiveRun | None:
+    def find(before: LiveRun | None) -> LiveRun | None:
         found = None if folder is None else find_live_run(folder)
-        return None if found is None else LiveRun(found)
+        return None if found is None or (before is not None and before.path == found) else LiveRun(found)
 
     return _follow(args, stage, find)
 
 
-def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[], LiveRun | None]) -> int:
+def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[LiveRun | None], LiveRun | None]) -> int:
     from coneskin.view.live_page import LivePage
 
     if hasattr(os, "nice"):

@@ -46,20 +46,22 @@ class ContactMark(NamedTuple):
 
 @dataclass(slots=True)
 class _Touch:
-    """Touch: the places that were told of it, each with its time [s], and when it ended."""
+    """Touch: the places told of it, each with its time [s], when it ended, and until when it holds the arm."""
 
     places: list[tuple[float, ContactMark]] = field(default_factory=list)
     ended: float = math.inf
+    held: float = -math.inf
 
 
 class ContactLog:
-    """Touches of a run, taken event by event.
+    """Touches of a run, taken event by event. The one that has stopped the arm is seen until the reset.
 
     An event whose place is nonsense has no mark; it stands among the events all the same.
     """
 
     def __init__(self) -> None:
         self._touches: dict[int, _Touch] = {}
+        self._stopping: Any = None  # number of the touch that has stopped the arm
 
     def feed(self, event: GuardEvent) -> None:
         """Take an event; those that tell of no touch are passed over."""
@@ -68,11 +70,23 @@ class ContactLog:
                 if touch.places[-1][1].sensor == event.details.get("sensor"):
                     touch.ended = min(touch.ended, event.time)
             return
+        if event.name in (EventName.RESET, EventName.ACTIVATED):
+            for touch in self._touches.values():
+                touch.held = min(touch.held, event.time)
+            self._stopping = None
+            return
+        if event.name == EventName.STOPPING and isinstance(contact := event.details.get("contact"), dict):
+            self._stopping = contact.get("number")
+            if isinstance(self._stopping, int) and self._stopping in self._touches:
+                self._touches[self._stopping].held = math.inf
         number = event.details.get("number")
         if not isinstance(number, int):
             return
         if event.name in _PLACE_EVENTS and (mark := _mark(number, event.details)) is not None:
-            self._touches.setdefault(number, _Touch()).places.append((event.time, mark))
+            touch = self._touches.setdefault(number, _Touch())
+            touch.places.append((event.time, mark))
+            if number == self._stopping:
+                touch.held = math.inf
             while len(self._touches) > _MAX_TOUCHES:
                 del self._touches[next(iter(self._touches))]
 
@@ -87,7 +101,7 @@ class ContactLog:
         found = []
         for touch in self._touches.values():
             told = [mark for then, mark in touch.places if then <= time]
-            age = time - touch.ended
+            age = 0.0 if time < touch.held else time - max(touch.ended, touch.held)
             if told and age < FADING:
                 found.append(told[-1]._replace(strength=min(1.0, 1.0 - age / FADING)))
         return sorted(found, key=lambda mark: (-mark.strength, -mark.number))

@@ -33,9 +33,10 @@ if TYPE_CHECKING:
     from coneskin.robot.driver.values import ControllerState
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["CHANNELS", "UNKNOWN", "History", "PhaseWords", "Series"]
+__all__ = ["CHANNELS", "PHASE_COLOURS", "UNKNOWN", "History", "PhaseWords", "Series"]
 
-_GREY, _GREEN, _AMBER, _RED, _VIOLET, _BLUE = "#6b7280", "#15803d", "#b45309", "#b91c1c", "#6d28d9", "#1d4ed8"
+#: kind of a phase -> its colour, which differ in brightness by 3 and more, so that no eye mistakes the last three
+PHASE_COLOURS = {"unknown": "#6b7280", "active": "#1d7dc9", "moving": "#fff3b8", "stopped": "#4a0d18"}
 
 
 class PhaseWords(NamedTuple):
@@ -43,33 +44,33 @@ class PhaseWords(NamedTuple):
 
     Attributes:
         text: in a few words.
-        colour: of its band, as in a style sheet.
+        kind: one of ``PHASE_COLOURS``.
     """
 
     text: str
-    colour: str
+    kind: str
 
 
-UNKNOWN = PhaseWords("nothing is known of the guard", _GREY)  #: before its first event
-_PHASE_ACTIVE = PhaseWords("active", _GREEN)
+UNKNOWN = PhaseWords("nothing is known of the guard", "unknown")  #: before its first event
+_PHASE_ACTIVE = PhaseWords("active", "active")
 #: event -> the phase that it begins
 _PHASE_OF_EVENT: Mapping[str, PhaseWords] = {
-    EventName.WAITING: PhaseWords("waiting, not active", _GREY),
+    EventName.WAITING: PhaseWords("waiting, not active", "unknown"),
     EventName.ACTIVATED: _PHASE_ACTIVE,
-    EventName.SPEED_REDUCED: PhaseWords("touched: slower", _AMBER),
+    EventName.SPEED_REDUCED: PhaseWords("touched: slower", "moving"),
     EventName.RESUMED: _PHASE_ACTIVE,
-    EventName.STOPPING: PhaseWords("stopping", _RED),
-    EventName.STANDSTILL: PhaseWords("stands", _RED),
-    EventName.STOP_FAILED: PhaseWords("standstill NOT confirmed", _RED),
-    EventName.RETREATING: PhaseWords("moving away from the touch", _AMBER),
-    EventName.RETREATED: PhaseWords("stopping after the motion away", _RED),
-    EventName.LATCHED: PhaseWords("latched: stands until a manual reset", _VIOLET),
-    EventName.RESET: PhaseWords("reset, not active yet", _GREY),
-    EventName.ENDING: PhaseWords("ending", _GREY),
-    EventName.GUARD_EXITED: PhaseWords("no guard: it has ended", _GREY),
-    EventName.GUARD_UNRESPONSIVE: PhaseWords("the guard does not answer", _RED),
-    EventName.GUARD_RESPONSIVE: PhaseWords("the guard answers again", _BLUE),
-    EventName.FALLBACK_STOP: PhaseWords("stopped without the guard", _RED),
+    EventName.STOPPING: PhaseWords("stopping", "stopped"),
+    EventName.STANDSTILL: PhaseWords("stands", "stopped"),
+    EventName.STOP_FAILED: PhaseWords("standstill NOT confirmed", "stopped"),
+    EventName.RETREATING: PhaseWords("moving away from the touch", "moving"),
+    EventName.RETREATED: PhaseWords("stopping after the motion away", "stopped"),
+    EventName.LATCHED: PhaseWords("latched: stands until a manual reset", "stopped"),
+    EventName.RESET: PhaseWords("reset, not active yet", "unknown"),
+    EventName.ENDING: PhaseWords("ending", "unknown"),
+    EventName.GUARD_EXITED: PhaseWords("no guard: it has ended", "unknown"),
+    EventName.GUARD_UNRESPONSIVE: PhaseWords("the guard does not answer", "stopped"),
+    EventName.GUARD_RESPONSIVE: PhaseWords("the guard answers again", "moving"),
+    EventName.FALLBACK_STOP: PhaseWords("stopped without the guard", "stopped"),
 }
 _REPEATING_EVENTS = {EventName.WAITING, EventName.STANDSTILL}  # within the phases below they say nothing new
 _FINAL_PHASES = {"latched: stands until a manual reset", "ending", "no guard: it has ended"}

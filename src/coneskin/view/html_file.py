@@ -17,7 +17,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
 
 from .page_server import PageServer, page_client
-from .panel import EVENT_STYLE, NOTICE, timeline
+from .panel import NOTICE, PAGE_LEGEND, state_of, timeline
 from .run_course import Moment, RunCourse, event_lines
 from .stage.level_scale import force_words, level_bars, level_words
 from .stage.sheet_surface import SheetSurface
@@ -68,14 +68,9 @@ _PAGE_STYLE = """
 body #root{width:calc(100% - 384px);overflow:hidden;transform:translateZ(0)}
 #coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
 background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
-#coneskin b{word-break:break-all}
-#coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:6px 0}
-.coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;margin:4px 0}
-.coneskin-health{color:#b91c1c;font-size:12px}
-#coneskin-timeline{width:100%!important;margin:0!important;display:block;cursor:pointer}
-#coneskin-events{font:11px/1.5 monospace;margin-top:6px}
-.coneskin-cursor{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
-#coneskin-traces{font-size:11px;margin:4px 10px}
+#coneskin-timeline{cursor:pointer}
+@media(max-width:700px){body #root{width:100%;height:45%}
+#coneskin{left:0;right:0;top:45%;bottom:0;width:auto;max-height:none}}
 #root .mantine-NumberInput-root,#root .mantine-Slider-label{display:none}
 """  # the client's own field and label count from the first picture, which is not where the run's clock has its zero
 
@@ -85,17 +80,13 @@ _PAGE_SCRIPT = """
   const data = JSON.parse(document.getElementById('coneskin-data').textContent);
   const panel = document.getElementById('coneskin');
   const phases = [...panel.querySelectorAll('.coneskin-phase')];
-  const healths = [...panel.querySelectorAll('.coneskin-health')];
+  const states = [...panel.querySelectorAll('.coneskin-state')];
   const clock = document.getElementById('coneskin-clock');
   const list = document.getElementById('coneskin-events');
   const cursors = [...panel.querySelectorAll('.coneskin-cursor')];
   const levels = [...panel.querySelectorAll('.coneskin-level')];
   const marks = [...panel.querySelectorAll('.coneskin-level-mark')];
   const forces = [...panel.querySelectorAll('.coneskin-force b')];
-  const traces = [...panel.querySelectorAll('.coneskin-trace')];
-  panel.querySelector('#coneskin-traces select').onchange = (event) => {
-    traces.forEach((trace, k) => { trace.hidden = k !== Number(event.target.value); });
-  };
   const rows = data.events.map((event) => {
     const row = document.createElement('div');
     row.textContent = event[1];
@@ -139,8 +130,8 @@ _PAGE_SCRIPT = """
       data.runs.forEach((run, k) => {
         const phase = last(run.phases, time);
         phases[k].textContent = (data.runs.length > 1 ? run.title + ': ' : '') + phase[1];
-        phases[k].style.background = phase[2];
-        healths[k].textContent = last(run.health, time)[1];
+        phases[k].className = 'coneskin-phase ' + phase[2];
+        states[k].innerHTML = last(run.states, time)[1];  // from Python, which has escaped what a recording says
         run.levels.forEach((changes, sheet) => {
           const level = last(changes, time)[1];
           levels[bar].textContent = run.words[sheet][level];
@@ -244,26 +235,22 @@ def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Se
     several = len(courses) > 1
     runs, parts, bars = [], [], []
     for course, levels in zip(courses, changes, strict=True):
-        phases = [[max(c.time - course.zero - since, 0.0), c.phase.text, c.phase.colour] for c in course.history.phases]
-        health = [[0.0, ""]]
-        for event in course.history.events:
-            if (wrong := course.history.health(event.time)) != health[-1][1]:
-                health.append([event.time - course.zero - since, wrong])
-        runs.append({"title": course.stage.title, "phases": phases, "health": health, **levels.data()})
-        title = "" if several else f"<b>{escape(course.stage.title)}</b>"  # of several, each phase says whose it is
-        parts.append(f'{title}<div class="coneskin-phase"></div>')
-        parts.append('<div class="coneskin-health"></div>')
+        phases = [[max(c.time - course.zero - since, 0.0), c.phase.text, c.phase.kind] for c in course.history.phases]
+        states = [[0.0, ""]]
+        for event in course.history.events[:_MAX_EVENTS]:
+            if (state := state_of(course, event.time)) != states[-1][1]:
+                states.append([event.time - course.zero - since, state])
+        runs.append({"title": course.stage.title, "phases": phases, "states": states, **levels.data()})
+        title = "" if several else f'<div class="coneskin-title">{escape(course.stage.title)}</div>'
+        parts.append(f'{title}<div class="coneskin-phase"></div><div class="coneskin-state"></div>')
         force = course.history.force(course.zero + since)
         none = {sheet.name: 0.0 for sheet in course.stage.sheets}
         bars.append(level_bars(course.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
     events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(courses)[:_MAX_EVENTS]]
     data = {"since": since, "duration": max(until - since, 1e-3), "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
-    drawn = timeline(courses, since, until)
     return (
-        f'<div id="coneskin"><div id="coneskin-notice">{escape(NOTICE)}</div>{"".join(parts)}'
-        '<div id="coneskin-clock"></div><div style="position:relative;margin:4px 10px 0">'
-        f'{drawn}<div class="coneskin-cursor"></div></div>{"".join(bars)}{trace_drawings(courses, since, until)}'
-        f'<style>{EVENT_STYLE}</style><div id="coneskin-events"></div></div>'
+        f'<div id="coneskin">{NOTICE}{"".join(parts)}<div id="coneskin-clock"></div>{timeline(courses, since, until)}'
+        f'{"".join(bars)}{trace_drawings(courses, since, until)}<div id="coneskin-events"></div>{PAGE_LEGEND}</div>'
         f'<script type="application/json" id="coneskin-data">{text}</script><script>{_PAGE_SCRIPT}</script>'
     )

@@ -8,19 +8,18 @@ from collections.abc import Callable
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError
-from coneskin.robot.guard.signals.event_text import describe
 
 from .field_choice import FieldChoice
-from .history import UNKNOWN, PhaseWords
+from .history import UNKNOWN
 from .live_run import LiveRun
 from .page_server import PageServer
-from .panel import event_list, notice, status, timeline
+from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, stop_entries, timeline
 from .playback import Playout
 from .run_course import Moment, RunCourse
 from .stage.level_scale import level_bars
 from .stage.stage import Stage
 from .stage_nodes import StageNodes, look_at_stages
-from .traces import TracePlot
+from .traces import trace_drawings
 
 __all__ = ["LivePage"]
 
@@ -30,9 +29,12 @@ _TEXT_PERIOD = 0.2  # s between two changes of the text: a processor that draws 
 _PLOT_PERIOD = 0.5  # s between two changes of timeline, traces and potentials
 _ROOT_NODE = "/run"
 _SEARCH_PERIOD = 0.3  # s between two looks for a guard
-_STALE_TIME = 0.7  # s without news after which the page says so
+_SEARCH_SILENCE = 1.0  # s without news after which a newer run is looked for
 _TIMELINE_SPAN = 20.0  # s of the timeline
-_MAX_LISTED_EVENTS = 60  # events that are put into words
+_MAX_LISTED_EVENTS = 200  # events that are put into words
+_AT_REST = (
+    '<div class="coneskin-card">No guard records a run: what is drawn is at rest. One that begins is shown.</div>'
+)
 
 
 class LivePage:
@@ -41,24 +43,22 @@ class LivePage:
     Args:
         server: of the page.
         stage: what is shown while there is no run.
-        find: returns the run to follow, or None while there is none.
+        find: returns the run to follow, None while there is none but the one it is given.
     """
 
-    def __init__(self, server: PageServer, stage: Stage, find: Callable[[], LiveRun | None]) -> None:
+    def __init__(self, server: PageServer, stage: Stage, find: Callable[[LiveRun | None], LiveRun | None]) -> None:
         self._server, self._stage, self._find = server, stage, find
         self._run: LiveRun | None = None
-        self._plot: TracePlot | None = None
         self._drawn = stage
         self._nodes: StageNodes | None = None
         self._texted = self._plotted = self._searched = -1e9
-        self._lines_of = -1
-        self._clock = ""
+        self._newest_event: object = None
         gui = server.gui
-        gui.add_html(notice())
-        self._timeline = gui.add_html("")
-        self._status = gui.add_html("")
-        self._levels = gui.add_html("")
-        self._events = gui.add_html("")
+        gui.add_html(NOTICE)
+        self._status, self._clock = gui.add_html(""), gui.add_html("")
+        gui.add_html('<div id="coneskin-stale"></div>')  # for the page's script alone
+        self._past, self._levels, self._events = gui.add_html(""), gui.add_html(""), gui.add_html("")
+        gui.add_html(PAGE_LEGEND)
         self._playout = Playout()
         self._choices: dict[int, FieldChoice] = {}
         self._entering = threading.Lock()  # viewers come and go in threads of their own
@@ -88,32 +88,33 @@ class LivePage:
         Args:
             now: the clock [s].
         """
-        if self._run is None:
-            if now - self._searched < _SEARCH_PERIOD:
-                return False
-            self._searched = now
-            try:
-                self._run = self._find()
-            except ConeSkinError:  # its header is not there yet
-                return False
-            if self._run is not None:
-                self._stand(self._run.course.stage)
-            return False
-        events = len(self._run.course.history.events)
+        if self._run is None or self._run.ended or self._run.silence > _SEARCH_SILENCE:
+            found = self._search(now)
+            if found or self._run is None:
+                return found
+        events = self._run.course.history.events
+        before = events[-1] if events else None
         try:
             self._run.poll()
         except ConeSkinError:
-            self._leave()
+            self.close()
             return True
-        news = len(self._run.course.history.events) != events
-        if self._run.ended or self._run.silence > 30.0:
-            self._searched = now
-            if (following := self._find()) is not None:
-                self._leave()
-                self._run = following
-                self._stand(following.course.stage)
-                return True
-        return news
+        return bool(events) and events[-1] is not before
+
+    def _search(self, now: float) -> bool:
+        """Go over to another run; return whether there is one."""
+        if now - self._searched < _SEARCH_PERIOD:
+            return False
+        self._searched = now
+        try:
+            found = self._find(self._run)
+        except ConeSkinError:  # its header is not there yet
+            return False
+        if found is not None:
+            self.close()
+            self._run = found
+            self._stand(found.course.stage)
+        return found is not None
 
     def draw(self, now: float) -> None:
         """Show the newest moment.
@@ -121,18 +122,41 @@ class LivePage:
         Args:
             now: the clock [s].
         """
-        course = None if self._run is None else self._run.course
-        if course is None:
-            self._text(now, [(self._stage.title, UNKNOWN, "")], "", "no guard records a run: what is drawn is at rest")
+        texted = now - self._texted >= _TEXT_PERIOD
+        if self._run is None:
+            _set(self._status, status([(self._stage.title, UNKNOWN, _AT_REST)]))
+            if texted:
+                self._texted = now
+                _set(self._clock, f'<div id="coneskin-clock" data-sent="{now:.2f}"></div>')
             return
+        course = self._run.course
         at = course.history.until - course.zero
         moment = course.moment(at, self._playout.time(at, now))
         assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
-        self._show_levels(now, moment)
-        self._text(now, [(course.stage.title, moment.phase, moment.health)], f"{at:9.3f} s", self._stale())
-        self._draw_past(now, course, at)
+        newest = course.history.events[-1] if course.history.events else None
+        if newest is not self._newest_event:
+            self._newest_event = newest
+            lines = stop_entries(course.history.events[-_MAX_LISTED_EVENTS:], course.zero)
+            _set(self._status, status([(course.stage.title, moment.phase, state_of(course, moment.time))]))
+            _set(self._events, event_list(lines, len(lines) - 1))
+        if texted:
+            self._texted = now
+            _set(self._levels, level_bars(self._drawn.sheets, moment.levels, moment.force))
+            over = ' data-over="1"' if self._run.ended else ""
+            told = f'data-sent="{now:.2f}" data-news="{now - self._run.silence:.2f}"{over}'
+            _set(self._clock, f'<div id="coneskin-clock" {told}>{at:9.3f} s</div>')
+        if now - self._plotted >= _PLOT_PERIOD:
+            self._plotted = now
+            self._draw_past(course, at)
+            with self._entering:
+                for choice in self._choices.values():
+                    choice.show([moment])
+
+    def _draw_past(self, course: RunCourse, at: float) -> None:
+        since = max(at - _TIMELINE_SPAN, course.history.since - course.zero)  # axes end with what is there
+        _set(self._past, timeline([course], since, at) + trace_drawings([course], since, at, live=True))
 
     def _enter(self, client: Any) -> Callable[[], None]:
         """Give a viewer its choice of potentials; return what takes it away."""
@@ -145,52 +169,10 @@ class LivePage:
 
         return leave
 
-    def _show_levels(self, now: float, moment: Moment) -> None:
-        if now - self._texted >= _TEXT_PERIOD:
-            levels = level_bars(self._drawn.sheets, moment.levels, moment.force)
-            if levels != self._levels.content:
-                self._levels.content = levels
-        if now - self._plotted >= _PLOT_PERIOD:
-            with self._entering:
-                for choice in self._choices.values():
-                    choice.show([moment])
-
-    def _stale(self) -> str:
-        assert self._run is not None
-        if self._run.ended:
-            return "the run is over: this is its last moment"
-        silence = self._run.silence
-        return f"NOTHING NEW for {silence:.1f} s: what is drawn is old" if silence > _STALE_TIME else ""
-
-    def _text(self, now: float, runs: list[tuple[str, PhaseWords, str]], clock: str, stale: str) -> None:
-        content = status(runs, clock if now - self._texted >= _TEXT_PERIOD else self._clock, stale)
-        if content != self._status.content:
-            self._clock = clock
-            self._texted = now
-            self._status.content = content
-
-    def _draw_past(self, now: float, course: RunCourse, at: float) -> None:
-        events = course.history.events
-        newest = len(events) and id(events[-1])
-        if newest != self._lines_of:
-            self._lines_of = newest
-            lines = [(event, describe(event, course.zero)) for event in events[-_MAX_LISTED_EVENTS:]]
-            self._events.content = event_list(lines, len(lines) - 1)
-        if now - self._plotted >= _PLOT_PERIOD and not (self._run is not None and self._run.ended):
-            self._plotted = now
-            self._timeline.content = timeline([course], at - _TIMELINE_SPAN, at)
-            if self._plot is None:
-                self._plot = TracePlot(self._server.gui, [course], at - _TIMELINE_SPAN, at, fixed=True)
-            else:
-                self._plot.move(at - _TIMELINE_SPAN, at)
-
     def _stand(self, stage: Stage) -> None:
         """Draw a stage in the place of the one before, unless it looks the same."""
-        if self._plot is not None:
-            self._plot.remove()
-            self._plot = None
-        self._clock = ""
-        self._playout = Playout()
+        self._playout, self._newest_event = Playout(), self
+        self._texted = self._plotted = -1e9
         if self._nodes is not None and self._drawn.same_shape(stage):
             self._drawn = stage
             return
@@ -204,13 +186,16 @@ class LivePage:
         look_at_stages(self._server, reach)
         self._nodes = StageNodes(scene, stage, _ROOT_NODE)
         levels = {sheet.name: 0.0 for sheet in stage.sheets}
-        self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, "", bodies=stage.moved(())))
+        self._nodes.show(Moment(0.0, stage.poses(None), levels, [], UNKNOWN, bodies=stage.moved(())))
 
-    def _leave(self) -> None:
+    def close(self) -> None:
+        """Close the recording that is followed; may be called again."""
         if self._run is not None:
             self._run.close()
             self._run = None
 
-    def close(self) -> None:
-        """Close the recording that is followed; may be called again."""
-        self._leave()
+
+def _set(place: Any, content: str) -> None:
+    """Set the HTML of a place on the page; what is there already is not sent."""
+    if content != place.content:
+        place.content = content

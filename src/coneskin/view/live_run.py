@@ -140,9 +140,7 @@ class _RecordingTail:
 
 
 KEPT = 60.0  #: s of a live run that its page keeps
-_GROWING_TIME = (
-    3.0  # s since the last write, within which a recording counts as growing: a guard records ticks all the time
-)
+_GROWING_TIME = 3.0  # s since the last write, within which a recording grows: a guard records ticks all the time
 _KINDS_KEPT = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.EVENT})
 
 
@@ -153,6 +151,7 @@ class LiveRun:
         path: the first file of its recording.
 
     Attributes:
+        path: the same.
         course: what is shown; its history grows.
         ended: the recording was closed.
 
@@ -173,7 +172,7 @@ class LiveRun:
         except BaseException:
             self._tail.close()
             raise
-        self.course = RunCourse(stage, history, run.start)
+        self.path, self.course = path, RunCourse(stage, history, run.start)
         self._grown = time.monotonic()
 
     @property

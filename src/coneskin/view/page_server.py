@@ -15,7 +15,8 @@ from typing import Any
 from coneskin.core.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
-from .viser_client import unpacked, with_file_drop, with_plain_edges
+from .page_script import PANEL_HEAD
+from .viser_client import unpacked, with_file_drop, with_head, with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
@@ -34,13 +35,13 @@ def _viser() -> Any:
 
 
 def page_client() -> str:
-    """Return the HTML of viser's client as a file that opens without Python contains it; it is served unpacked.
+    """Return the HTML of viser's client, with the panel's script, as a file contains it; it is served unpacked.
 
     Raises:
         MissingExtra: viser is not installed.
     """
     client = Path(_viser().__file__).parent / "client" / "build" / "index.html"
-    return with_plain_edges(client.read_text(encoding="utf-8"))
+    return with_head(with_plain_edges(client.read_text(encoding="utf-8")), PANEL_HEAD)
 
 
 class PageServer:

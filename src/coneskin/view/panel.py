@@ -2,70 +2,155 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
 from html import escape
 
-from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+from coneskin.core.text import printable
+from coneskin.robot.guard.signals.event_text import describe
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way, stopping_contact
 
-from .history import PhaseWords
+from .history import PHASE_COLOURS, PhaseWords
 from .run_course import RunCourse
 
-__all__ = ["EVENT_STYLE", "NOTICE", "event_list", "notice", "status", "timeline"]
+__all__ = ["NOTICE", "PAGE_LEGEND", "event_list", "state_of", "status", "stop_entries", "timeline"]
 
-NOTICE = "No safety display. What is drawn may be late, old or wrong; nobody may rely on it near an arm."
+NOTICE = (
+    '<div id="coneskin-notice">No safety display. What is drawn may be late, old or wrong; '
+    "nobody may rely on it near an arm.</div>"
+)
+#: what is to be seen, for who looks for the first time
+PAGE_LEGEND = (
+    '<details id="coneskin-legend" open><summary>What you see</summary>'
+    "Dark blue: a sheet of skin. Its edge and its bar turn magenta at a touch, pale yellow at a firm one.<br>"
+    "Ring, disc and arrow: the place of a touch, where it is with 95 %, and the outward normal. "
+    "No disc: not certain yet. The touch that stopped the arm stays until the reset.<br>"
+    "&#9654; active, &#9670; the arm reacts, &#9632; it is stopped, ? not active, "
+    "&#10005; grey: old, nothing new comes.</details>"
+)
 _MAX_SHOWN_EVENTS = 9  # events of the list
 _MAX_LINE_LENGTH = 1200  # letters of a line
-#: of the lines of events: three lines of the panel each, and all of it under the pointer or where it was clicked
-EVENT_STYLE = """
-#coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
-display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
-#coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
-"""
 _ALARM_EVENTS = {"contact", "contact_located", "contact_extended", "stopping", "stop_failed", "fault", "guard_exited"}
+_STOP_ENDS = {EventName.RESET, EventName.ACTIVATED, EventName.GUARD_EXITED}
 
 
-def notice() -> str:
-    """Return the words that stand on every page."""
-    style = "border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px;margin:4px 10px"
-    return f'<div id="coneskin-notice" style="{style}">{escape(NOTICE)}</div>'
-
-
-def status(runs: Sequence[tuple[str, PhaseWords, str]], clock: str, stale: str = "", share: float | None = None) -> str:
-    """Return the phases of the guards, what is wrong, and the time.
+def status(runs: Sequence[tuple[str, PhaseWords, str]]) -> str:
+    """Return the phases of the guards, and what holds their arms or is wrong.
 
     Args:
-        runs: title, phase and what is wrong, of each run on the page.
-        clock: the time in words.
-        stale: why what is shown is old; empty where it is not.
-        share: where on the timeline the time is, 0 to 1; None without a timeline.
+        runs: title, phase, and the HTML of ``state_of``, of each run on the page.
     """
     parts = []
-    if share is not None:
-        left = f"left:calc({100.0 * min(max(share, 0.0), 1.0):.2f}% - 1px)"
-        parts.append(
-            '<div style="position:relative;height:9px;margin:-4px 10px 0 10px">'
-            f'<div style="position:absolute;{left};width:2px;height:9px;background:#111827"></div></div>'
-        )
-    for title, phase, wrong in runs:
-        name = f'<span style="opacity:.8">{escape(title)}</span><br>' if len(runs) > 1 else ""
-        parts.append(
-            f'<div class="coneskin-phase" style="background:{phase.colour};color:white;padding:6px 10px;'
-            f'font-size:15px;margin:4px 10px">{name}{escape(phase.text)}</div>'
-        )
-        if wrong:
-            parts.append(
-                f'<div class="coneskin-health" style="color:#b91c1c;font-size:12px;margin:2px 10px">'
-                f"{escape(wrong[:400])}</div>"
-            )
-    if stale:
-        parts.append(
-            f'<div id="coneskin-stale" style="background:#111827;color:#fbbf24;padding:6px 10px;margin:4px 10px">'
-            f"{escape(stale)}</div>"
-        )
-    parts.append(
-        f'<div id="coneskin-clock" style="font-family:monospace;font-size:13px;margin:2px 10px">{escape(clock)}</div>'
-    )
+    for title, phase, state in runs:
+        text = escape(f"{title}: {phase.text}" if len(runs) > 1 else phase.text)
+        parts.append(f'<div class="coneskin-phase {phase.kind}" data-text="{text}">{text}</div>{state}')
     return "".join(parts)
+
+
+def state_of(course: RunCourse, time: float) -> str:
+    """Return the card of the stop that holds an arm at a time [s, host clock], or else what is wrong; as HTML.
+
+    The card stays until the reset. It says what the events of the guard say, and nothing else.
+    """
+    events = [event for event in course.history.events if event.time <= time]
+    held = _held_stop(events)
+    if not held:
+        cause, remedy = _cause_and_remedy(course.history.health(time))
+        return _card([("wrong", cause), ("remedy", remedy)] if cause else [])
+    return _card([("time", f"{held[0].time - course.zero:.3f} s"), *_stop_rows(held[0], held, events, course.zero)])
+
+
+def _held_stop(events: Sequence[GuardEvent]) -> list[GuardEvent]:
+    """Return the events of the stop that holds the arm, from "stopping" on; none where none does."""
+    found: list[GuardEvent] = []
+    for event in events:
+        if event.name in (EventName.RESET, EventName.ACTIVATED):
+            found = []
+        elif found or event.name == EventName.STOPPING:
+            found.append(event)
+    return found
+
+
+def _stop_rows(
+    stop: GuardEvent, held: Sequence[GuardEvent], events: Sequence[GuardEvent], zero: float
+) -> list[tuple[str, str]]:
+    """Return name and words of all that is known of a stop: its cause, its place, how the arm came to stand."""
+    last = {event.name: event.details for event in held}
+    rows: list[tuple[str, str]] = []
+    try:
+        if (contact := stopping_contact(stop, events)) is not None:
+            d = contact.details
+            reach = "" if d.get("ellipse") is None else f" +- {max(0.1, 1e3 * math.hypot(*d['ellipse'][0])):.1f} mm"
+            sure = "" if d["location_valid"] else ", not certain"
+            place = f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg{reach}{sure}"
+            rows += [("touch", f"{d['sensor']} ({d['link']})"), ("place", place), ("level", f"{d['level']:.2f}")]
+        else:
+            rows += zip(("cause", "remedy"), _cause_and_remedy(stop.details["why"]), strict=True)
+        faults = {
+            _stem(event): event for event in held if event.name == EventName.FAULT and _stem(event) != _stem(stop)
+        }
+        rows += [("also", _cause_and_remedy(event.details["what"])[0]) for event in faults.values()]
+        for stands in [event for event in held if event.name == EventName.STANDSTILL][:1]:
+            paths = ", ".join(stands.details["paths"])
+            rows.append(("stop path", f"{paths}, stands after {1e3 * (stands.time - stop.time):.0f} ms"))
+        if EventName.STOP_FAILED in last:
+            rows.append(("stop path", "standstill NOT confirmed: use the emergency stop"))
+        if (retreated := last.get(EventName.RETREATED)) is not None:
+            rows.append(("moved away", f"{describe_way(retreated)}: {_cause_and_remedy(retreated['why'])[0]}"))
+    except (LookupError, TypeError, ValueError, AttributeError):  # recorded by another version, or damaged
+        return [("stop", describe(stop, zero))]
+    if EventName.LATCHED in last:
+        rows.append(("next", "reset the guard when nobody touches the arm"))
+    return rows
+
+
+def _card(rows: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f"<tr><th>{name}</th><td>{escape(_line(text))}</td></tr>" for name, text in rows if text)
+    return f'<div class="coneskin-card"><table>{lines}</table></div>' if lines else ""
+
+
+def _cause_and_remedy(text: str) -> tuple[str, str]:
+    """Return the two halves of an error's text: what is wrong, and what to do; a bracket that is cut is closed."""
+    cause, _, remedy = " ".join(text.split()).partition("; ")
+    if cause.count("(") > cause.count(")"):
+        cause, remedy = f"{cause})", remedy.replace(")", "", 1)
+    return cause, remedy
+
+
+def stop_entries(events: Sequence[GuardEvent], zero: float) -> list[tuple[GuardEvent, str]]:
+    """Return one entry for each stop, and one for each other event; what is told again is counted.
+
+    Args:
+        events: of a run.
+        zero: host time that counts as 0 [s].
+
+    Returns:
+        the first event of each entry, and its line.
+    """
+    groups: list[list[GuardEvent]] = []
+    stopped = False
+    for event in events:
+        stopped = stopped and event.name not in _STOP_ENDS
+        if stopped or (groups and _stem(event) == _stem(groups[-1][0])):
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+        stopped = stopped or event.name == EventName.STOPPING
+    return [(group[0], _entry(group, events, zero)) for group in groups]
+
+
+def _entry(group: Sequence[GuardEvent], events: Sequence[GuardEvent], zero: float) -> str:
+    for stop in (event for event in group if event.name == EventName.STOPPING):
+        words = "; ".join(f"{name}: {text}" for name, text in _stop_rows(stop, group, events, zero) if text)
+        return printable(f"{stop.time - zero:9.4f} s  stop; {words}")
+    return describe(group[0], zero) + (f" ({len(group)} times)" if len(group) > 1 else "")
+
+
+def _stem(event: GuardEvent) -> str:
+    """Return what two events have in common that tell of the same: their words without numbers."""
+    said = event.details.get("what" if event.name == EventName.FAULT else "why")
+    return re.sub(r"[\d.]+", "#", _cause_and_remedy(said)[0]) if isinstance(said, str) else f"{event.name} {event.time}"
 
 
 def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
@@ -79,15 +164,10 @@ def event_list(lines: Sequence[tuple[GuardEvent, str]], now: int) -> str:
     rows = []
     for index in range(begin, min(begin + _MAX_SHOWN_EVENTS, len(lines))):
         event, line = lines[index]
-        style = "font-weight:700;" if index == now else "opacity:.45;" if index > now else ""
-        colour = "#b91c1c" if event.name in _ALARM_EVENTS else "inherit"
-        kind = ' class="now"' if index == now else ""
-        rows.append(f'<div tabindex="0"{kind} style="{style}color:{colour}">{escape(_line(line))}</div>')
-    return (
-        f"<style>{EVENT_STYLE}</style>"
-        '<div id="coneskin-events" style="font-family:monospace;font-size:11px;line-height:1.5;margin:2px 10px">'
-        f"{''.join(rows) or 'no events'}</div>"
-    )
+        kind = "now" if index == now else "ahead" if index > now else ""
+        alarm = " alarm" if event.name in _ALARM_EVENTS else ""
+        rows.append(f'<div tabindex="0" class="{kind}{alarm}">{escape(_line(line))}</div>')
+    return f'<div id="coneskin-events">{"".join(rows) or "no events"}</div>'
 
 
 def _line(text: str) -> str:
@@ -96,6 +176,8 @@ def _line(text: str) -> str:
 
 
 _WIDTH, _BAND, _TICK, _GAP = 1000.0, 16.0, 8.0, 6.0
+#: height of a phase's band as a share: a shape, for those to whom its colour says nothing
+_BAND_SHARES = {"unknown": 0.25, "active": 0.5, "moving": 0.75, "stopped": 1.0}
 _CONTACT_EVENTS = {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED}
 _FAULT_EVENTS = {EventName.FAULT, EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.STOP_FAILED}
 _MAX_TICKS = 400  # ticks; a run with more faults than pixels has one wherever one looks
@@ -113,8 +195,8 @@ def timeline(courses: Sequence[RunCourse], since: float, until: float) -> str:
     row = _BAND + _TICK + _GAP
     height = row * len(courses)
     parts = [
-        f'<svg id="coneskin-timeline" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" preserveAspectRatio="none" '
-        f'style="width:calc(100% - 20px);height:{height:.0f}px;margin:4px 10px 0">'
+        f'<div class="coneskin-timeline"><svg id="coneskin-timeline" viewBox="0 0 {_WIDTH:.0f} {height:.0f}" '
+        f'preserveAspectRatio="none" style="height:{height:.0f}px">'
     ]
     for number, course in enumerate(courses):
         top = number * row
@@ -124,13 +206,17 @@ def timeline(courses: Sequence[RunCourse], since: float, until: float) -> str:
             x0 = (max(change.time - course.zero, since) - since) * scale
             x1 = (min(end - course.zero, until) - since) * scale
             if x1 > x0:
+                tall = _BAND * _BAND_SHARES[change.phase.kind]
                 parts.append(
-                    f'<rect x="{x0:.2f}" y="{top + _TICK:.1f}" width="{max(x1 - x0, 1.0):.2f}" height="{_BAND}" '
-                    f'fill="{change.phase.colour}"><title>{escape(change.phase.text)}</title></rect>'
+                    f'<rect x="{x0:.2f}" y="{top + _TICK + _BAND - tall:.1f}" width="{max(x1 - x0, 1.0):.2f}" '
+                    f'height="{tall:g}" stroke="#111827" stroke-width=".5" fill="{PHASE_COLOURS[change.phase.kind]}">'
+                    f"<title>{escape(change.phase.text)}</title></rect>"
                 )
         shown = [event for event in course.history.events if since <= event.time - course.zero <= until]
         for event in [event for event in shown if event.name in _CONTACT_EVENTS | _FAULT_EVENTS][-_MAX_TICKS:]:
             x = (event.time - course.zero - since) * scale
-            colour = "#e11d48" if event.name in _CONTACT_EVENTS else "#111827"
-            parts.append(f'<rect x="{x - 1.5:.2f}" y="{top:.1f}" width="3" height="{_TICK}" fill="{colour}"/>')
-    return "".join([*parts, "</svg>"])
+            colour, wide = ("#d646e0", 4) if event.name in _CONTACT_EVENTS else ("#111827", 2)
+            parts.append(
+                f'<rect x="{x - 0.5 * wide:.2f}" y="{top:.1f}" width="{wide}" height="{_TICK}" fill="{colour}"/>'
+            )
+    return "".join([*parts, '</svg><div class="coneskin-cursor"></div></div>'])

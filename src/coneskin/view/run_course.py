@@ -33,7 +33,6 @@ class Moment:
         levels: of the sensors, by their names.
         marks: of contacts.
         phase: of the guard.
-        health: what is wrong; empty where nothing is.
         force: between the arm and what it meets [N]; None where nothing tells.
         bodies: how far each part of a body is from where the scene puts it [m].
     """
@@ -43,7 +42,6 @@ class Moment:
     levels: dict[str, float]
     marks: list[ContactMark]
     phase: PhaseWords
-    health: str
     force: float | None = None
     bodies: tuple[Vector, ...] = ()
 
@@ -83,7 +81,7 @@ class RunCourse:
         at, history, stage = self.zero + time, self.history, self.stage
         then = at if moving is None else self.zero + moving
         levels = {sheet.name: history.level(sheet.name, at) for sheet in stage.sheets}
-        seen = history.contacts.marks(at), history.phase(at), history.health(at), history.force(at)
+        seen = history.contacts.marks(at), history.phase(at), history.force(at)
         return Moment(at, stage.poses(history.q(then)), levels, *seen, stage.moved(history.places(then)))
 
 

@@ -14,12 +14,12 @@ from coneskin.robot.guard.signals.journal import EventName
 
 from .field_choice import FieldChoice
 from .page_server import PageServer
-from .panel import event_list, notice, status, timeline
+from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, timeline
 from .playback import SPEEDS, Playback
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
-from .traces import TracePlot
+from .traces import trace_drawings
 
 __all__ = ["show_runs"]
 
@@ -75,9 +75,9 @@ class _Player:
 
     def _make_panel(self, gui: Any) -> None:
         playback = self._playback
-        gui.add_html(notice())
+        gui.add_html(NOTICE)
         for course in self._strands:
-            gui.add_html(_title(course.stage.title))
+            gui.add_html(f'<div class="coneskin-title">{escape(course.stage.title)}</div>')
         gui.add_html(timeline(self._strands, playback.since, playback.until))
         self._status = gui.add_html("")
         step = max(1e-3, round((playback.until - playback.since) / 2e5, 3))
@@ -93,7 +93,8 @@ class _Player:
         )
         self._jump = gui.add_dropdown("event", choices, initial_value=choices[0])
         self._events = gui.add_html("")
-        self._plot = TracePlot(gui, self._strands, playback.since, playback.until)
+        gui.add_html(trace_drawings(self._strands, playback.since, playback.until))
+        gui.add_html(PAGE_LEGEND)
         self._slider.on_update(self._sought)
         self._buttons.on_click(self._pressed)
         self._speed.on_update(self._speeded)
@@ -166,20 +167,17 @@ class _Player:
         playback = self._playback
         share = (at - playback.since) / max(playback.until - playback.since, 1e-9)
         runs = [
-            (course.stage.title, moment.phase, moment.health)
+            (course.stage.title, moment.phase, state_of(course, moment.time))
             for course, moment in zip(self._strands, moments, strict=True)
         ]
-        self._status.content = status(runs, f"{at:9.3f} s of {playback.until:.3f} s", share=share)
+        clock = f'data-share="{100.0 * min(max(share, 0.0), 1.0):.2f}%">{at:9.3f} s of {playback.until:.3f} s'
+        self._status.content = f'{status(runs)}<div id="coneskin-clock" {clock}</div>'
         if abs(float(self._slider.value) - at) > 1e-9:
             self._slider.value = at
         newest = bisect_right(self._times, at + 1e-6) - 1
         if newest != self._shown:
             self._shown = newest
             self._events.content = event_list(self._lines, newest)
-
-
-def _title(text: str) -> str:
-    return f'<div style="font-size:13px;margin:2px 10px;word-break:break-all"><b>{escape(text)}</b></div>'
 
 
 def _down(time: float) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from coneskin.geometry.pose import Vector
+from coneskin.geometry.pose import Pose, Vector
 
-from .stage.level_scale import level_colour
+from .stage.level_scale import SHEET_COLOURS, level_colour
 from .stage.solids import along, joined, quaternion, revolve
 from .stage.stage import floor_lines
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from coneskin.core.arrays import Floats, Ints
+    from coneskin.geometry.placed_frustum import PlacedFrustum
 
     from .contact_mark import ContactMark
     from .page_server import PageServer
@@ -26,10 +27,12 @@ if TYPE_CHECKING:
 __all__ = ["StageNodes", "light_plainly", "look_at_stages"]
 
 _MARKS_PER_LINK = 6  # nodes for contacts on each link with a sheet, used again and again
-_LOCATED, _UNCERTAIN, _PAST = (192, 38, 211), (249, 115, 22), (120, 113, 108)
-_FLOOR, _RIM = (175, 175, 180), (30, 33, 36)
+_LOCATED, _UNCERTAIN, _PAST = (214, 70, 224), (249, 115, 22), (150, 143, 138)
+_FLOOR, _RIM = (175, 175, 180), (150, 180, 205)
 _ARROW_LENGTH = 0.14  # m; length of the arrow along the normal
 _MIN_HALF_AXIS = 0.004  # m; half axes of an ellipse that can still be seen
+_RING_RADII = 0.021, 0.026  # m; of the ring about it, which is seen from across a room
+_MARK_HEIGHT = 0.003  # m above the place
 _FADE_STEPS = 8  # steps in which a mark fades
 _SEGMENT_COUNT = 32
 
@@ -91,15 +94,16 @@ class StageNodes:
         self._colours: dict[str, tuple[int, int, int]] = {}
         for number, sheet in enumerate(stage.sheets):
             name = f"{root}/link {sheet.link}/sheet {number} {_node(sheet.name)}"
-            colour = self._colours[sheet.name] = level_colour(0.0, sheet.touch_level)
-            self._sheets[sheet.name] = _add_mesh(scene, name, *_both_sides(sheet.vertices, sheet.faces), colour)
-            _add_mesh(scene, f"{name}/active area", *_both_sides(sheet.rim_vertices, sheet.rim_faces), _RIM)
+            self._colours[sheet.name] = _RIM
+            _add_mesh(scene, name, *_both_sides(sheet.vertices, sheet.faces), SHEET_COLOURS[0])
+            rim = _both_sides(sheet.rim_vertices, sheet.rim_faces)  # it tells the level: the sheet's face has the place
+            self._sheets[sheet.name] = _add_mesh(scene, f"{name}/active area", *rim, _RIM)
         links = sorted({sheet.link for sheet in stage.sheets})
         self._marks = {
             link: [_MarkNodes(scene, f"{root}/link {link}/contact {k}") for k in range(_MARKS_PER_LINK)]
             for link in links
         }
-        self._link_of = {sheet.name: sheet.link for sheet in stage.sheets}
+        self._sheet_of = {sheet.name: sheet for sheet in stage.sheets}
 
     def show(self, moment: Moment) -> None:
         """Move and colour the nodes; what has not changed is not sent."""
@@ -109,21 +113,22 @@ class StageNodes:
         for frame, moved in zip(self._bodies, moment.bodies, strict=True):
             frame.position = moved
         for sheet in self._stage.sheets:
-            colour = level_colour(moment.levels[sheet.name], sheet.touch_level)
+            level = moment.levels[sheet.name]
+            colour = level_colour(level, sheet.touch_level) if level >= sheet.touch_level else _RIM
             if colour != self._colours[sheet.name]:
                 self._colours[sheet.name] = self._sheets[sheet.name].color = colour
         left = {link: list(nodes) for link, nodes in self._marks.items()}
         for mark in moment.marks:
-            nodes = left.get(self._link_of.get(mark.sensor, -1))
-            if nodes:
-                nodes.pop(0).show(mark)
+            sheet = self._sheet_of.get(mark.sensor)
+            if sheet is not None and (nodes := left[sheet.link]):
+                nodes.pop(0).show(mark, sheet.item.frustum)
         for nodes in left.values():
             for node in nodes:
                 node.hide()
 
 
 class _MarkNodes:
-    """Nodes of one contact: its ball, the arrow along its normal, and the ellipse of its uncertainty."""
+    """Nodes of one contact: the arrow along its normal, and on the sheet a ring and the ellipse of its uncertainty."""
 
     def __init__(self, scene: Any, name: str) -> None:
         self._scene, self._name = scene, name
@@ -131,26 +136,32 @@ class _MarkNodes:
         self._drawn: tuple[Any, ...] | None = None
         self._parts: list[Any] = []
 
-    def show(self, mark: ContactMark) -> None:
+    def show(self, mark: ContactMark, side: PlacedFrustum) -> None:
         fading = math.ceil(mark.strength * _FADE_STEPS)
         drawn = (mark._replace(strength=fading, level=0.0),)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._draw(mark, fading / _FADE_STEPS)
+            self._draw(mark, side, fading / _FADE_STEPS)
         self._frame.visible = True
 
     def hide(self) -> None:
         self._frame.visible = False
 
-    def _draw(self, mark: ContactMark, strength: float) -> None:
+    def _draw(self, mark: ContactMark, side: PlacedFrustum, strength: float) -> None:
+        import numpy as np
+
         colour = _PAST if strength < 1.0 else _LOCATED if mark.located else _UNCERTAIN
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
-        self._frame.position, self._frame.wxyz = mark.point, quaternion(along(mark.normal))
         arrow, faces = _arrow()
-        _add_mesh(self._scene, f"{self._name}/normal", arrow, faces, colour, shade)
-        _add_mesh(
-            self._scene, f"{self._name}/uncertainty", *_both_sides(*_ellipse(mark)), colour, 0.55 * (shade or 1.0)
-        )
+        there = Pose.trusted(along(mark.normal).rotation, mark.point)
+        _add_mesh(self._scene, f"{self._name}/normal", _single(there.apply_all(arrow)), faces, colour, shade)
+        turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENT_COUNT + 1)
+        circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        ring = np.stack([radius * circle for radius in _RING_RADII])
+        _add_mesh(self._scene, f"{self._name}/ring", *_on_sheet(side, mark.point, ring), colour, shade)
+        disc = circle @ _half_axes(mark, side) * (1.0 if mark.located else 1e-3)
+        uncertainty = _on_sheet(side, mark.point, np.stack([1e-3 * disc, disc]))
+        _add_mesh(self._scene, f"{self._name}/uncertainty", *uncertainty, colour, shade)
 
 
 def _add_mesh(
@@ -185,19 +196,38 @@ def _arrow() -> tuple[NDArray[np.float32], Ints]:
     return _single(vertices), faces
 
 
-def _ellipse(mark: ContactMark) -> tuple[Floats, Ints]:
-    """Return the ellipse of a mark in its own frame; a small disc where nothing is known of its size."""
+def _on_sheet(side: PlacedFrustum, point: Vector, rows: Floats) -> tuple[NDArray[np.float32], Ints]:
+    """Return a band that lies on a sheet about a point.
+
+    Args:
+        side: of the sheet.
+        point: in the same frame [m].
+        rows: where the band's two edges are from there, along u and around [m], shape (2, n, 2).
+    """
     import numpy as np
 
-    back = along(mark.normal).inverse()
-    axes = mark.ellipse or ((_MIN_HALF_AXIS, 0.0, 0.0), (0.0, _MIN_HALF_AXIS, 0.0))
-    first, second = (np.array(back.rotate(axis) if mark.ellipse else axis) for axis in axes)
-    first, second = _visible(first), _visible(second)
-    turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENT_COUNT, endpoint=False)[:, None]
-    rim = np.cos(turn) * first + np.sin(turn) * second + (0.0, 0.0, 0.004)
-    vertices = np.concatenate([[[0.0, 0.0, 0.004]], rim])
-    k = np.arange(_SEGMENT_COUNT)
-    return vertices, np.column_stack([np.zeros_like(k), 1 + k, 1 + (k + 1) % _SEGMENT_COUNT])
+    u, phi, height = side.locate(point)
+    around = phi + rows[..., 1] / max(side.frustum.radius_at(u), _MIN_HALF_AXIS)
+    points, normals = side.place(u + rows[..., 0], around)
+    k, count = np.arange(rows.shape[1] - 1), rows.shape[1]
+    faces = np.concatenate([np.stack([k, k + 1, k + 1 + count], 1), np.stack([k, k + 1 + count, k + count], 1)])
+    return _both_sides((points + (height + _MARK_HEIGHT) * normals).reshape(-1, 3), faces)
+
+
+def _half_axes(mark: ContactMark, side: PlacedFrustum) -> Floats:
+    """Return the half axes of a mark along u and around [m], shape (2, 2), none too short to be seen."""
+    import numpy as np
+
+    if mark.ellipse is None:
+        return _MIN_HALF_AXIS * np.eye(2)
+    u, phi, _ = side.locate(mark.point)
+    points, _ = side.place(np.array([u, u + 1e-4, u]), np.array([phi, phi, phi + 1e-4]))
+    ways = (points[1:] - points[0]) / np.linalg.norm(points[1:] - points[0], axis=1)[:, None]
+    axes = np.array(mark.ellipse) @ ways.T
+    sizes = np.linalg.norm(axes, axis=1)
+    turned = np.array([[-axes[0][1], axes[0][0]]]) / max(sizes[0], 1e-12)
+    units = np.concatenate([axes[:1] / max(sizes[0], 1e-12), turned]) if sizes[0] > 0.0 else np.eye(2)
+    return units * np.maximum(sizes, _MIN_HALF_AXIS)[:, None]
 
 
 def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Ints]:
@@ -208,13 +238,6 @@ def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Int
     import numpy as np
 
     return np.concatenate([_single(vertices)] * 2), np.concatenate([faces, len(vertices) + faces[:, ::-1]])
-
-
-def _visible(axis: Floats) -> Floats:
-    import numpy as np
-
-    length = float(np.linalg.norm(axis))
-    return axis * max(1.0, _MIN_HALF_AXIS / length) if length > 0.0 else np.array((_MIN_HALF_AXIS, 0.0, 0.0))
 
 
 def _single(values: Floats) -> NDArray[np.float32]:

@@ -1,7 +1,4 @@
-"""Traces of a run: values over time in as few points as a small plot can show, with no peak lost.
-
-A page that Python serves draws them with viser, a page in a file as SVG.
-"""
+"""Traces of a run: values over time, as SVG of as few points as a small plot can show, with no peak lost."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from html import escape
 from itertools import cycle
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .history import CHANNELS, Series
 from .run_course import RunCourse
@@ -17,7 +14,7 @@ from .run_course import RunCourse
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
 
-__all__ = ["COLOURS", "MOST_LINES", "TracePlot", "trace_drawings", "traces"]
+__all__ = ["trace_drawings", "traces"]
 
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
@@ -65,7 +62,7 @@ def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) 
         for name, series, column in _columns(course, what):
             names.append(before + name)
             rows.append(_envelope(series, column, course.zero, edges))
-    names, rows = names[:MOST_LINES], rows[:MOST_LINES]
+    names, rows = names[:_MAX_LINES], rows[:_MAX_LINES]
     return _Traces(tuple(names), times, np.array(rows).reshape(len(rows), len(times)))
 
 
@@ -100,108 +97,68 @@ def _envelope(series: Series, column: int, zero: float, edges: Floats) -> Floats
 
 
 #: of the lines, in their order
-COLOURS = ("#2563eb", "#ea580c", "#16a34a", "#7c3aed", "#854d0e", "#0891b2", "#db2777", "#4b5563")
-MOST_LINES = 12  #: of one plot
+_LINE_COLOURS = ("#2563eb", "#ea580c", "#16a34a", "#7c3aed", "#854d0e", "#0891b2", "#db2777", "#4b5563")
+_LINE_DASHES = ("", "6 3", "2 2", "8 2 2 2")  # a shape as well
+_MAX_LINES = 12  # of one plot
 
 
-class TracePlot:
-    """Plot of runs.
-
-    Args:
-        gui: viser's ``GuiApi``.
-        courses: the runs.
-        since: from when on, on the page's clock [s].
-        until: until when.
-        fixed: touch levels alone are drawn, and nobody can choose: on a page that all viewers share.
-    """
-
-    def __init__(self, gui: Any, courses: Sequence[RunCourse], since: float, until: float, fixed: bool = False) -> None:
-        self._gui, self._strands, self._since, self._until = gui, courses, since, until
-        names = self._names = _trace_names(courses)
-        self._folder = gui.add_folder("traces")
-        self._shown = names[0]
-        with self._folder:
-            choice = None if fixed else gui.add_dropdown("show", names, initial_value=names[0])
-            self._plot = self._make()
-        if choice is not None:
-            choice.on_update(lambda _event: self._change(str(choice.value)))
-
-    def move(self, since: float, until: float) -> None:
-        """Draw another stretch of time."""
-        self._since, self._until = since, until
-        found = traces(self._strands, self._shown, since, until)
-        self._plot.data, self._plot.scales = (found.times, *found.values), _scales(found)
-
-    def remove(self) -> None:
-        """Take the plot off the page."""
-        self._folder.remove()
-
-    def _change(self, what: str) -> None:
-        if what not in self._names or what == self._shown:
-            return
-        old, self._shown = self._plot, what
-        with self._folder:
-            self._plot = self._make()
-        old.remove()
-
-    def _make(self) -> Any:
-        found = traces(self._strands, self._shown, self._since, self._until)
-        series: list[dict[str, Any]] = [{"label": "time [s]"}]
-        series += [{"label": n, "stroke": c, "width": 1.5} for n, c in zip(found.names, cycle(COLOURS), strict=False)]
-        return self._gui.add_uplot(
-            (found.times, *found.values), tuple(series), scales=_scales(found), legend={"show": True}, aspect=1.7
-        )
-
-
-def _value_range(found: _Traces) -> tuple[float, float]:
-    """Return from where to where the values of traces are drawn, with a margin; 0 to 1 where there are none."""
+def _value_range(what: str, found: _Traces) -> tuple[float, float]:
+    """Return from where to where values are drawn: levels and forces from 0, speeds as far below 0 as above."""
     import numpy as np
 
     known = found.values[np.isfinite(found.values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    if what == _LEVELS:
+        return 0.0, 1.0
+    if what == _SPEEDS:
+        high = max(abs(low), abs(high), 1e-3)
+        return -1.05 * high, 1.05 * high
     margin = 0.05 * (high - low) or 0.5
-    return low - margin, high + margin
-
-
-def _scales(found: _Traces) -> dict[str, Any]:
-    """Return the axes of a plot; one that looks for its own range finds none where a value is missing (NaN)."""
-    return {"x": {"time": False, "auto": True}, "y": {"auto": False, "range": _value_range(found)}}
+    return 0.0 if what == _FORCE else low - margin, high + margin
 
 
 _WIDTH, _HEIGHT = 480.0, 120.0  # units of the drawing, which fills the panel
 
 
-def trace_drawings(courses: Sequence[RunCourse], since: float, until: float) -> str:
-    """Return a choice of traces and the drawing of each, of which all but the first are hidden.
+def trace_drawings(courses: Sequence[RunCourse], since: float, until: float, live: bool = False) -> str:
+    """Return drawings of traces; of several, the page's script shows the one that its viewer chooses.
 
     Args:
         courses: the runs.
         since: from when on, on the page's clock [s].
         until: until when.
+        live: touch levels alone, up to now.
     """
-    names = _trace_names(courses)
+    names = _trace_names(courses)[: 1 if live else None]
     options = "".join(f'<option value="{number}">{escape(name)}</option>' for number, name in enumerate(names))
-    drawings = [_drawing(traces(courses, name, since, until)) for name in names]
+    choice = f"<b>{escape(names[0])}</b>" if live else f"<select>{options}</select>"
+    ends = (f"{since - until:.0f} s", "now") if live else (f"{since:.3f} s", f"{until:.3f} s")
+    drawings = [_drawing(name, traces(courses, name, since, until), ends) for name in names]
     hidden = ["", *[" hidden"] * (len(names) - 1)]
     drawn = "".join(f'<div class="coneskin-trace"{a}>{b}</div>' for a, b in zip(hidden, drawings, strict=True))
-    return f'<div id="coneskin-traces"><label>traces <select>{options}</select></label>{drawn}</div>'
+    return f'<div id="coneskin-traces"><label>traces {choice}</label>{drawn}</div>'
 
 
-def _drawing(found: _Traces) -> str:
-    low, high = _value_range(found)
-    span = float(found.times[-1] - found.times[0])
-    x = (found.times - found.times[0]) / max(span, 1e-9) * _WIDTH
+def _drawing(what: str, found: _Traces, ends: tuple[str, str]) -> str:
+    low, high = _value_range(what, found)
+    since, until = float(found.times[0]), float(found.times[-1])
+    x = (found.times - since) / max(until - since, 1e-9) * _WIDTH
     lines, words = [], []
-    for name, values, colour in zip(found.names, found.values, cycle(COLOURS), strict=False):
+    for name, values, colour, dash in zip(
+        found.names, found.values, cycle(_LINE_COLOURS), cycle(_LINE_DASHES), strict=False
+    ):
         course = _course(x, (high - values) / (high - low) * _HEIGHT)
-        lines.append(f'<path d="{course}" fill="none" stroke="{colour}" vector-effect="non-scaling-stroke"/>')
+        look = f'fill="none" stroke="{colour}" stroke-width="1.5" vector-effect="non-scaling-stroke"'
+        lines.append(f'<path d="{course}" data-name="{escape(name)}" stroke-dasharray="{dash}" {look}/>')
         words.append(f'<span style="color:{colour}">&#9644;</span> {escape(name)}')
     return (
-        f'<div style="position:relative"><svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" preserveAspectRatio="none" '
-        f'style="display:block;width:100%;height:{_HEIGHT:g}px;background:#f9fafb">{"".join(lines)}</svg>'
-        f'<span style="position:absolute;left:2px;top:0">{high:.3g}</span>'
-        f'<span style="position:absolute;left:2px;bottom:0">{low:.3g}</span><div class="coneskin-cursor"></div></div>'
-        f"<div>{', '.join(words)}</div>"
+        f'<div class="coneskin-plot" data-since="{since}" data-until="{until}" data-low="{low}" data-high="{high}" '
+        f'data-width="{_WIDTH}" data-height="{_HEIGHT}">'
+        f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" preserveAspectRatio="none" style="height:{_HEIGHT:g}px">'
+        f'{"".join(lines)}</svg><span style="top:0">{high:.3g}</span><span style="bottom:0">{low:.3g}</span>'
+        '<div class="coneskin-cursor"></div><div class="coneskin-pointer" hidden></div></div>'
+        f'<div class="coneskin-read"></div><div class="coneskin-ends"><span>{ends[0]}</span>'
+        f"<span>{', '.join(words)}</span><span>{ends[1]}</span></div>"
     )
 
 

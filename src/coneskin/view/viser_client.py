@@ -20,7 +20,7 @@ import gzip
 import json
 import re
 
-__all__ = ["unpacked", "with_file_drop", "with_plain_edges"]
+__all__ = ["unpacked", "with_file_drop", "with_head", "with_plain_edges"]
 
 #: printable letters but those that mean something in HTML or in a string
 _BASE88_LETTERS = "".join(letter for letter in map(chr, range(0x21, 0x7F)) if letter not in "\"&<>'`")
@@ -115,7 +115,7 @@ _FILE_DROP_SCRIPT = """
 
 def with_file_drop(page: str) -> str:
     """Return a page with the script in its head."""
-    return page.replace("<head>", f"<head><script>{_FILE_DROP_SCRIPT}</script>", 1)
+    return with_head(page, f"<script>{_FILE_DROP_SCRIPT}</script>")
 
 
 _PLAIN_EDGES_SCRIPT = """
@@ -145,4 +145,9 @@ _PLAIN_EDGES_SCRIPT = """
 
 def with_plain_edges(page: str) -> str:
     """Return a page with the script in its head, before anything that draws."""
-    return page.replace("<head>", f"<head><script>{_PLAIN_EDGES_SCRIPT}</script>", 1)
+    return with_head(page, f"<script>{_PLAIN_EDGES_SCRIPT}</script>")
+
+
+def with_head(page: str, head: str) -> str:
+    """Return a page whose head begins with some HTML."""
+    return page.replace("<head>", f"<head>{head}", 1)

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .sheet_surface import SheetSurface
 
-__all__ = ["force_words", "gradient", "level_bars", "level_colour", "level_words"]
+__all__ = ["SHEET_COLOURS", "force_words", "gradient", "level_bars", "level_colour", "level_words"]
 
 _COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
-_QUIET, _TOUCHED, _FIRM = (46, 125, 107), (245, 158, 11), (220, 38, 38)
+#: quiet, touched and firm: from dark to bright, each with a contrast of 3 and more to the one before, to any eye
+SHEET_COLOURS = (12, 44, 74), (214, 70, 224), (255, 248, 200)
 _FIRM_LEVEL = 0.6
 _GRADIENT_STOPS = 16  # of a bar's gradient
 _MAX_FORCE_TICKS = 4  # of a force table that have a tick
@@ -21,9 +22,9 @@ _MAX_FORCE_TICKS = 4  # of a force table that have a tick
 def level_colour(level: float, touch_level: float) -> tuple[int, int, int]:
     """Return the colour of a sheet: quiet below its touch level, then from touched to firm."""
     if level < touch_level:
-        low, high, share = _QUIET, _TOUCHED, 0.5 * max(level, 0.0) / touch_level
+        low, high, share = *SHEET_COLOURS[:2], 0.4 * max(level, 0.0) / touch_level
     else:
-        low, high = _TOUCHED, _FIRM
+        low, high = SHEET_COLOURS[1:]
         share = min(1.0, (level - touch_level) / max(_FIRM_LEVEL - touch_level, 1e-3))
     share = round(share * _COLOUR_STEPS) / _COLOUR_STEPS
     red, green, blue = (round(a + share * (b - a)) for a, b in zip(low, high, strict=True))
@@ -63,7 +64,7 @@ def level_bars(
     parts += [_bar(sheet, levels[sheet.name]) for sheet in sheets]
     if force is not None:
         parts.append(f'<div class="coneskin-force">force of the contact, in physics: <b>{force_words(force)}</b></div>')
-    return f'<div id="coneskin-levels" style="font-size:12px;margin:4px 10px">{"".join(parts)}</div>'
+    return f'<div id="coneskin-levels">{"".join(parts)}</div>'
 
 
 def force_words(force: float) -> str:

@@ -19,7 +19,7 @@ _SHEET_HEIGHT = (
 _MAX_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
 _VERTEX_DISTANCE = 0.008  # m between two vertices along a side that is not straight, about
 _MAX_VERTICES = 96  # vertices along or around
-_RIM_WIDTH, _RIM_ABOVE = 0.0025, 0.0006  # m; of the band that shows where the active area ends, above the sheet
+_RIM_WIDTH, _RIM_ABOVE = 0.005, 0.0006  # m; of the band that shows where the active area ends, above the sheet
 
 
 class SheetSurface(NamedTuple):

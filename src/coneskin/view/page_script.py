@@ -1,0 +1,120 @@
+"""Style and script of the panel in a browser, of a page that Python serves and of a page in a file.
+
+The browser counts by itself how old the page is, so that a guard, a server or a network that is silent shows. Its clock
+and the server's differ by what the quickest message took, which may drift by as much as two poor crystals.
+"""
+
+from __future__ import annotations
+
+__all__ = ["PANEL_HEAD"]
+
+_PANEL_STYLE = """
+#coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px}
+#coneskin-notice,.coneskin-phase,.coneskin-card,.coneskin-title,#coneskin-stale,#coneskin-clock,#coneskin-levels,
+#coneskin-events,#coneskin-traces,#coneskin-legend{margin:4px 10px}
+.coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;background:#6b7280}
+.coneskin-phase::before{content:"? "}
+.coneskin-phase.active{background:#1d7dc9}.coneskin-phase.active::before{content:"\\25B6\\FE0E  "}
+.coneskin-phase.moving{background:#fff3b8;color:#111827;outline:1px solid #4a0d18}
+.coneskin-phase.moving::before{content:"\\25C6  "}
+.coneskin-phase.stopped{background:#4a0d18}.coneskin-phase.stopped::before{content:"\\25A0  "}
+.coneskin-old .coneskin-phase{color:#fff;outline:none;
+background:repeating-linear-gradient(45deg,#6b7280 0 8px,#5b616d 8px 16px)}
+.coneskin-old .coneskin-phase::before{content:"\\2715  "}
+.coneskin-old canvas[data-engine],.coneskin-old #coneskin-timeline{filter:grayscale(1) opacity(.35)}
+#coneskin-stale{background:#111827;color:#fbbf24;padding:6px 10px}
+#coneskin-stale:empty{display:none}
+#coneskin-clock{font:13px monospace}
+.coneskin-card{border-left:6px solid #4a0d18;background:#f3f4f6;color:#111827;font-size:12px;padding:4px 8px}
+.coneskin-card th{text-align:left;font-weight:600;padding-right:1em;vertical-align:top;white-space:nowrap}
+.coneskin-title{font-size:13px;word-break:break-all;font-weight:700}
+#coneskin-levels,#coneskin-legend{font-size:12px}
+#coneskin-events{font:11px/1.5 monospace}
+#coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
+display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
+#coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
+#coneskin-events>.alarm{color:#8f1421}#coneskin-events>.now{font-weight:700}#coneskin-events>.ahead{opacity:.45}
+.coneskin-timeline{position:relative;margin:4px 10px 0;overflow:hidden}
+#coneskin-timeline{width:100%;display:block}
+.coneskin-cursor,.coneskin-pointer{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
+.coneskin-cursor{left:-9px}.coneskin-pointer{width:1px}
+#coneskin-traces{font-size:11px}
+.coneskin-plot{position:relative;overflow:hidden;border-bottom:1px solid #111827;border-left:1px solid #111827}
+.coneskin-plot svg{display:block;width:100%;background:#f9fafb}
+.coneskin-plot>span{position:absolute;left:3px;background:#f9fafbcc;color:#111827}
+.coneskin-read{min-height:1.4em}
+.coneskin-ends{display:flex;justify-content:space-between}
+#coneskin-top{display:none}
+@media(max-width:700px){
+#coneskin-top{display:block;position:fixed;z-index:20;left:0;right:0;top:0;background:#fff;padding:2px 0 4px;
+max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}
+[class*=Notifications-root]{display:none!important}
+}
+"""
+
+_PANEL_SCRIPT = """
+(function () {
+  const all = (words) => [...document.querySelectorAll(words)];
+  const put = (place, key, value) => { if (place[key] !== value) place[key] = value; };
+  let sent = 0, offset = Infinity, looked = 0, chosen = '0', pointer = null;
+  function silence(clock) {  // of the guard and of the page's server [s]
+    const now = performance.now() / 1e3, told = Number(clock.dataset.sent);
+    if (told < sent) offset = Infinity;  // another server
+    if (told !== sent) {
+      offset = Math.min(now - told, offset + 2e-4 * (now - looked));
+      looked = now;
+      sent = told;
+    }
+    return [now - offset - (clock.dataset.news || told), now - offset - told];
+  }
+  function follow() {
+    const clock = document.getElementById('coneskin-clock');
+    if (clock === null) return;
+    if (clock.dataset.sent) {
+      const [guard, server] = silence(clock), over = clock.dataset.over, old = over || guard > 1;
+      document.documentElement.classList.toggle('coneskin-old', Boolean(old));
+      all('#root .coneskin-phase').forEach((phase) => put(phase, 'textContent', !old ? phase.dataset.text
+        : `was ${phase.dataset.text}${over ? ': the run is over' : `, ${Math.floor(guard)} s ago`}`));
+      const who = server > 1 ? 'page\\'s server' : 'guard';
+      const words = over ? 'the run is over: this is its last moment'
+        : old ? `NOTHING NEW from the ${who} for ${Math.floor(guard)} s: what is drawn is old` : '';
+      all('#coneskin-stale').forEach((line) => put(line, 'textContent', words));
+      let top = document.getElementById('coneskin-top');
+      if (top === null) {
+        top = document.body.appendChild(document.createElement('div'));
+        top.id = 'coneskin-top';
+      }
+      const parts = all('#root .coneskin-phase, #root .coneskin-card').map((part) => part.outerHTML).join('');
+      if (top.coneskin !== parts) { top.innerHTML = parts; top.coneskin = parts; }
+    }
+    if (clock.dataset.share) all('.coneskin-cursor').forEach((line) => put(line.style, 'left', clock.dataset.share));
+    all('#coneskin-traces select').forEach((choice) => put(choice, 'value', chosen));
+    all('.coneskin-trace').forEach((trace, k) => put(trace, 'hidden', String(k) !== chosen));
+    all('.coneskin-plot').forEach(read);
+  }
+  function read(plot) {  // the values under the pointer
+    const box = plot.getBoundingClientRect(), line = plot.querySelector('.coneskin-pointer');
+    const share = pointer === null ? -1 : (pointer.clientX - box.left) / box.width;
+    line.hidden = !(share >= 0 && share <= 1 && pointer.clientY >= box.top && pointer.clientY <= box.bottom);
+    const words = line.hidden ? [] : all('path').filter((path) => plot.contains(path)).map((path) => {
+      let best = null;
+      for (const point of path.getAttribute('d').slice(1).split(/[ML]/)) {
+        const [x, y] = point.split(' ').map(Number), off = Math.abs(x - share * plot.dataset.width);
+        if (best === null || off < best[0]) best = [off, y];
+      }
+      const value = plot.dataset.high - best[1] / plot.dataset.height * (plot.dataset.high - plot.dataset.low);
+      return `${path.dataset.name} ${value.toFixed(3)}`;
+    });
+    const time = Number(plot.dataset.since) + share * (plot.dataset.until - plot.dataset.since);
+    line.style.left = `${100 * share}%`;
+    put(plot.nextElementSibling, 'textContent', words.length ? `${time.toFixed(3)} s: ${words.join(', ')}` : '');
+  }
+  addEventListener('pointermove', (event) => { pointer = event; all('.coneskin-plot').forEach(read); }, true);
+  addEventListener('change', (event) => {
+    if (event.target.closest && event.target.closest('#coneskin-traces')) { chosen = event.target.value; follow(); }
+  }, true);
+  setInterval(follow, 100);
+})();
+"""
+#: for the head of a page
+PANEL_HEAD = f"<style id=coneskin-style>{_PANEL_STYLE}</style><script>{_PANEL_SCRIPT}</script>"
