@@ -39,6 +39,7 @@ def test_a_collision_carries_the_touch_as_values() -> None:
     assert (collision.point, collision.normal) == ((0.1, 0.2, 0.3), (0.0, 0.0, 1.0))
     assert (collision.level, collision.time, collision.location_valid) == (0.7, 4.5, True)
     assert collision.standstill_confirmed
+    assert Collision("touched").standstill_confirmed is False
     assert collision.event is TOUCH
 
 

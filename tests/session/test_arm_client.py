@@ -132,9 +132,11 @@ def test_a_path_that_cannot_be_is_refused_before_anything_is_sent(ends, waypoint
     assert driver.receive() == []
 
 
-def test_the_last_way_point_has_no_blend(ends) -> None:
+def test_a_way_point_may_be_slow_and_the_last_has_no_blend(ends) -> None:
     program, driver = ends
     arm = ArmClient(program, lambda stopped: None, arm_model("UR5e"), "nowhere")
+    slow = Waypoint.move_l([0.0] * 6, speed=1e-3, acceleration=1e-3)
+    assert arm._waypoint(0, slow).speed == 1e-3
     thread = call(lambda: arm.move_path([Waypoint.move_j([0.0] * 6, blend=0.1)] * 2), [])
     request = asked(driver)
     answer(driver, request["number"])

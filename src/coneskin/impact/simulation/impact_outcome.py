@@ -127,13 +127,13 @@ class ImpactOutcome:
         standstill: when the arm first stood, measured [s]; NaN where it did not.
     """
 
-    peak: float = 0.0
-    clamp: float = 0.0
-    impulse: float = 0.0
-    depth: float = 0.0
-    approach: float = 0.0
-    noticed: float = math.nan
-    standstill: float = math.nan
+    peak: float
+    clamp: float
+    impulse: float
+    depth: float
+    approach: float
+    noticed: float
+    standstill: float
 
 
 class ImpactMeter:
