@@ -209,10 +209,14 @@ class Server:
         except OSError as exc:
             sock.close()
             taken = exc.errno == errno.EADDRINUSE
-            advice = "ur_rtde uses fixed ports, so choose another" if taken else "choose an address of this machine as"
+            advice = (
+                "UR's ports are fixed: end the controller that has this one, or"
+                if taken
+                else "it is not this computer's:"
+            )
             raise RobotRefused(
                 f"the simulated controller cannot listen on {host} port {port} ({name}): {exc.strerror}; {advice} "
-                "--host, such as 127.0.0.2"
+                "choose another address, such as 127.0.0.2 (arm.host of a scene, --host of sim-ur and demo)"
             ) from exc
         sock.setblocking(False)
         self._listeners[name] = sock

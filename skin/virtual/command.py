@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import math
 import os
@@ -204,13 +205,26 @@ def _write_file(skin: VirtualSkin, output: str, as_json: bool) -> int:
             count = _write_packets(skin, sys.stdout.buffer)
             sys.stdout.buffer.flush()
         else:
-            with Path(output).open("wb") as file:
+            with _open_output(Path(output)) as file:
                 count = _write_packets(skin, file)
     except OSError as error:
         raise SkinConnectionError(f"{output}: cannot be written ({error.strerror or error})") from error
     if output != "-":
         _say(as_json, {"output": output, "bytes": count}, f"wrote {count} bytes to {output}")
     return 0
+
+
+def _open_output(path: Path) -> BinaryIO:
+    """Open a file to write bytes; a named pipe only if it is read, because opening it would wait for a reader."""
+    if not path.is_fifo():
+        return path.open("wb")
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    except OSError as error:
+        why = "nobody reads this pipe: start its reader first" if error.errno == errno.ENXIO else error.strerror
+        raise SkinConnectionError(f"{path}: {why}") from error
+    os.set_blocking(descriptor, True)
+    return os.fdopen(descriptor, "wb")
 
 
 def _write_packets(skin: VirtualSkin, file: BinaryIO) -> int:

@@ -7,12 +7,13 @@ import json
 import shlex
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from coneskin.cli import main
 from coneskin.commands.demo import _collision_facts, _print_report
-from coneskin.commands.terminal import print_hint
+from coneskin.commands.terminal import print_hint, print_line
 from coneskin.runs.replay.run import Run
 from coneskin.scene.reader import parse_scene
 
@@ -41,6 +42,14 @@ def test_a_hint_is_the_command_or_is_left_out(
     print_hint(f"next: coneskin init {shlex.quote(folder)}")
     words = shlex.split(raw.getvalue().decode(encoding))
     assert words == (["next:", "coneskin", "init", folder] if printed else [])
+
+
+def test_a_line_is_written_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The lines of two threads would share one otherwise: ``print`` writes the line's end on its own."""
+    written: list[str] = []
+    monkeypatch.setattr(sys, "stdout", SimpleNamespace(write=written.append, flush=lambda: None))
+    print_line("5.6052 s  stop: touch")
+    assert written == ["5.6052 s  stop: touch\n"]
 
 
 def test_a_guard_ends_with_the_replay_of_what_it_has_recorded(

@@ -136,8 +136,9 @@ def test_a_link_longer_than_the_arms_is_of_another_arm(
     assert "no arm was named" not in capsys.readouterr().out
 
 
-def test_a_skin_alone_has_no_arm(here: Path) -> None:
+def test_a_skin_alone_has_no_arm(here: Path, capsys: Output) -> None:
     assert main(["init", "skin", "--skin-only", "--simulated", "--link", "gripper"]) == 0  # a link of no arm of UR's
+    assert capsys.readouterr().out.splitlines()[-1] == "next: coneskin doctor scene.toml"  # there is no arm to simulate
     scene = load_scene(here / "scene.toml")
     assert scene.links[0].name == "gripper"
     assert (scene.arm, scene.motion, len(scene.sensors)) == (None, None, 1)

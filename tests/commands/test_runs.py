@@ -74,6 +74,8 @@ def test_cut_and_diff(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert [d["subject"] for d in other["differences"]] == ["retreat"]
     assert main(["runs", "diff", str(target), "--tolerance", "place=1"]) == 1
     assert "there is no tolerance place; there are place_mm" in capsys.readouterr().err
+    assert main(["runs", "diff", *[str(target)] * 3]) == 2
+    assert "diff compares one run, or two, got 3; many runs: coneskin replay RUN" in capsys.readouterr().err
 
 
 @pytest.mark.long
@@ -90,7 +92,7 @@ def test_another_version_of_the_code_is_asked_in_its_own_interpreter(
 
 
 def test_export_names_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (file,) = facts(capsys, "export", str(COLLISION), "-o", str(tmp_path / "run.npz"), "--format", "npz")["files"]
+    (file,) = facts(capsys, "export", str(COLLISION), "-o", str(tmp_path / "run.npz"))["files"]
     assert file["path"] == str(tmp_path / "run.npz")
     assert (tmp_path / "run.npz").stat().st_size > 10_000
 

@@ -47,11 +47,11 @@ def test_what_is_advised_for_a_short_sheet_leaves_what_is_said():
     assert small_active_area(advised) == ""
 
 
-def test_nothing_is_said_of_a_sheet_of_which_a_quarter_is_active():
+def test_nothing_is_said_of_a_sheet_of_which_three_tenths_are_active():
     shares = {height: design_of(0.036, 1e-3 * height).layout.active_share for height in range(26, 45)}
     for height, share in shares.items():
-        assert (small_active_area(design_of(0.036, 1e-3 * height)) == "") == (share >= 0.25)
-    assert min(shares.values()) < 0.25 < max(shares.values())
+        assert (small_active_area(design_of(0.036, 1e-3 * height)) == "") == (share >= 0.30)
+    assert min(shares.values()) < 0.30 < max(shares.values())
 
 
 def test_report_and_command_line_warn_alike(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -31,7 +31,7 @@ from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 from coneskin.scene.required_packages import has_physics_engine
 
-from .terminal import print_hint
+from .terminal import print_hint, print_line
 
 if TYPE_CHECKING:
     import socket
@@ -270,7 +270,7 @@ def run(args: argparse.Namespace) -> int:
 
     def say(line: str) -> None:
         if not args.json:
-            print(line, flush=True)
+            print_line(line)
 
     say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
     if not soft:

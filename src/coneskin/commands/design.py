@@ -304,9 +304,13 @@ def _print_next(design: LinkDesign, output: Path) -> None:
     print_hint(f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help")
     unnamed = design.mesh is None or arm_link(design.name) is None
     which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
-    if design.mesh is not None:
-        print_hint(
-            f"on another arm than a UR: coneskin init {folder} --simulated --skin-only, which reports touches; "
-            "only UR arms are guarded"
-        )
-    print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm")
+    guarded = f"coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm"
+    alone = f"coneskin init {folder} --simulated --skin-only"
+    if design.mesh is None:
+        print_hint(f"next: {guarded}")
+    elif unnamed:  # the mesh is not named as a link of a UR arm, and only those are guarded
+        print_hint(f"on a UR arm: {guarded}")
+        print_hint(f"next: {alone}, which reports touches")
+    else:
+        print_hint(f"on another arm than a UR: {alone}, which reports touches; only UR arms are guarded")
+        print_hint(f"next: {guarded}")

@@ -21,7 +21,7 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 
 from .simulated_arm import simulated_arm
-from .terminal import print_hint, typed_lines
+from .terminal import print_hint, print_line, typed_lines
 
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
@@ -98,9 +98,9 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
         if event.name == EventName.GUARD_EXITED:
             return  # the error that ends this program contains it
         if args.json:
-            print(json.dumps({"t": event.time - session.began, "name": event.name, **event.details}), flush=True)
+            print_line(json.dumps({"t": event.time - session.began, "name": event.name, **event.details}))
         else:
-            print(lines.describe(event, session.began), flush=True)
+            print_line(lines.describe(event, session.began))
 
     signal.signal(signal.SIGTERM, _as_interrupt)
     start_timeout = _START_TIMEOUT if args.duration_s is None else min(_START_TIMEOUT, args.duration_s)
@@ -110,7 +110,7 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
         arm = simulated_arm(scene, bodies=True) if args.simulated else contextlib.nullcontext()
         with arm as session.pressed_by, session:
             if session.recording and not args.json:
-                print(f"recording to {session.recording}", flush=True)
+                print_line(f"recording to {session.recording}")
             work.run()
     except KeyboardInterrupt:
         print(f"coneskin guard: ended by you; {_last_words(session)}", file=sys.stderr)

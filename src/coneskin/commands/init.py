@@ -84,7 +84,9 @@ def run(args: argparse.Namespace) -> int:
         print(f"warning: {finding.line}", file=sys.stderr)
     if address and not args.arm:
         print(f"no arm was named, so it is a {address.model}: --arm MODEL names another of UR's, --skin-only is none")
-    print_hint(f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated else ''}")
+    print_hint(
+        f"next: coneskin doctor {shlex.quote(str(args.output))}{' --simulated' if args.simulated and scene.arm else ''}"
+    )
     return 0
 
 

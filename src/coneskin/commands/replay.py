@@ -248,7 +248,10 @@ def _report_runs(rows: Sequence[dict[str, Any]], varied: bool) -> None:
         same = sum(bool(row["same"]) for row in good)
         print(f"{same} of {len(rows)} run{'s'[: len(rows) != 1]} replayed the same as recorded")
     elif any(row["truth"] == "recorded" for row in good):
-        print("no one knows what touched some of these runs: the contacts that they recorded count as the truth there")
+        print(
+            "no one knows what touched some of these runs: the contacts that they recorded count as the truth there, "
+            "any other as unlabeled; say what touched in NAME.touches.toml, as docs/do/runs.md tells"
+        )
 
 
 def _exit_code(rows: Sequence[dict[str, Any]], compared: bool, incomplete_too: bool) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,8 +78,8 @@ _EXPORT_EXAMPLE = """\
 examples:
   coneskin runs export runs/a -o out                       CSV files in a folder
   coneskin runs export runs/a -o out --format parquet      for DuckDB, pandas, Polars
-  coneskin runs export runs/a -o a.npz --format npz
-  coneskin runs export runs/a -o a.mcap --format mcap      for Foxglove
+  coneskin runs export runs/a -o a.npz
+  coneskin runs export runs/a -o a.mcap                    for Foxglove
 
 Exit code: 0 written; 1 not: nothing is overwritten.
 """
@@ -126,14 +127,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     cut.add_argument("-o", "--output", type=Path, metavar="FILE", help="recording to make (default: NAME-cut.rec)")
     diff = job("diff", "contacts moved, reactions earlier or later, new and missing ones", _DIFF_EXAMPLE)
     diff.add_argument("one", type=Path, metavar="A", help="a run")
-    diff.add_argument("other", type=Path, nargs="?", metavar="B", help="another; without it: A as today's code sees it")
+    diff.add_argument(
+        "others", type=Path, nargs="*", metavar="B", help="another; without it: A as today's code sees it"
+    )
     diff.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help=_SETTING_HELP)
     diff.add_argument("--python", type=Path, metavar="FILE", help="interpreter of another version of coneskin, for A")
     diff.add_argument("--tolerance", action="append", default=[], metavar="NAME=VALUE", help=_TOLERANCE_HELP)
     export = job("export", "tables for other programs", _EXPORT_EXAMPLE)
     export.add_argument("run", type=Path, metavar="RUN", help="folder of a run, or its recording")
     export.add_argument("-o", "--output", type=Path, required=True, metavar="PATH", help="folder, or file (npz, mcap)")
-    export.add_argument("--format", choices=("csv", "parquet", "npz", "mcap"), default="csv", help="default: csv")
+    export.add_argument(
+        "--format",
+        choices=("csv", "parquet", "npz", "mcap"),
+        help="default: npz or mcap, as PATH ends with it, else csv",
+    )
     prune = job("prune", "drop for good what is far from any touch, stop or fault; events stay", _PRUNE_EXAMPLE)
     prune.add_argument("runs", **many)  # type: ignore[arg-type]
     prune.add_argument(
@@ -276,7 +283,11 @@ def _diff(args: argparse.Namespace) -> int:
     from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines
     from coneskin.runs.replay.event_details import Tolerances
 
-    one, other = _sides(args)
+    if len(args.others) > 1:
+        said = f"diff compares one run, or two, got {1 + len(args.others)}; many runs: coneskin replay RUN ..."
+        print(f"coneskin runs: {said}, with --set or --vary for other settings", file=sys.stderr)
+        return 2
+    one, other = _sides(args, *args.others)
     tolerances = Tolerances.from_words(args.tolerance)
     if one.window != other.window and not args.tolerance:
         from coneskin.runs.cut import CUT_TOLERANCES
@@ -292,28 +303,28 @@ def _diff(args: argparse.Namespace) -> int:
     return 0 if comparison.same else 1
 
 
-def _sides(args: argparse.Namespace) -> tuple[Decisions, Decisions]:
+def _sides(args: argparse.Namespace, beside: Path | None = None) -> tuple[Decisions, Decisions]:
     from coneskin.runs.decisions import decide_again, recorded_decisions
     from coneskin.scene.settings import parse_settings
 
     settings = parse_settings(args.set)
     first = _read(args.one)
-    second = first if args.other is None else _read(args.other)
+    second = first if beside is None else _read(beside)
     if args.python is not None:
         from coneskin.runs.event_file import decide_with
 
-        if args.other is not None:
+        if beside is not None:
             raise RecordingError("--python compares two versions of the code on one run: leave B out")
         today = decide_again(first, settings, "today's code", progress=_bar("today's code"))
         return decide_with(args.python, args.one, recorded_decisions(first)), today
     if settings:
-        label = "today's code" if args.other is None else str(args.one)
+        label = "today's code" if beside is None else str(args.one)
         return decide_again(first, label=label, progress=_bar(label)), decide_again(
             second, settings, progress=_bar("with the settings")
         )
-    if args.other is None:
+    if beside is None:
         return recorded_decisions(first), decide_again(first, label="today's code", progress=_bar("today's code"))
-    return recorded_decisions(first, str(args.one)), recorded_decisions(second, str(args.other))
+    return recorded_decisions(first, str(args.one)), recorded_decisions(second, str(beside))
 
 
 def _export(args: argparse.Namespace) -> int:
@@ -324,7 +335,8 @@ def _export(args: argparse.Namespace) -> int:
         print(json.dumps({"files": [{"path": str(path), "rows": rows} for path, rows in written.items()]}))
     else:
         for path, rows in written.items():
-            print(f"{path}: {rows} {'messages' if args.format == 'mcap' else 'rows'}")
+            kind = args.format or path.suffix[1:]
+            print(f"{path}: {rows} {'messages' if kind == 'mcap' else 'rows'}")
     return 0
 
 

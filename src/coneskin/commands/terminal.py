@@ -20,7 +20,16 @@ if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.reading import TouchReading
 
-__all__ = ["LiveReading", "Person", "ending_signals", "page_timeout", "print_hint", "show_page", "typed_lines"]
+__all__ = [
+    "LiveReading",
+    "Person",
+    "ending_signals",
+    "page_timeout",
+    "print_hint",
+    "print_line",
+    "show_page",
+    "typed_lines",
+]
 
 
 def print_hint(text: str) -> None:
@@ -37,7 +46,13 @@ def print_hint(text: str) -> None:
     except UnicodeEncodeError:
         return
     if text.isprintable():
-        print(text, flush=True)
+        print_line(text)
+
+
+def print_line(text: str) -> None:
+    """Print a line in one piece: lines of several threads never share one, as those of ``print`` do in a pipe."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 def typed_lines() -> queue.SimpleQueue[str]:

@@ -123,7 +123,8 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
         if low < -_BEYOND or high > length + _BEYOND:
             yield (
                 f"{where} reaches from {1e3 * low:.0f} to {1e3 * high:.0f} mm along the {name}, whose joints are at "
-                f"0 and {1e3 * length:.0f} mm: correct xyz_mm, or the frame"
+                f"0 and {1e3 * length:.0f} mm: name the link and the arm that it was designed for; correct xyz_mm or "
+                "the frame if they are yours"
             )
             continue
         beside = max(math.hypot(*begin[:2]), math.hypot(*end[:2]))
@@ -132,7 +133,8 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
             yield (
                 f"{where} lies {1e3 * beside:.0f} mm beside the axis of the {name}, turned by "
                 f"{math.degrees(tilt):.0f} deg against it: right for a sheet about another axis of the link; otherwise "
-                "correct xyz_mm and rpy_deg, the frame, or whose link it is"
+                "name the link and the arm that it was designed for; correct xyz_mm, rpy_deg or the frame if they are "
+                "yours"
             )
         radius = max(cone.radius1, cone.radius2)
         if radius > room:

@@ -167,6 +167,20 @@ def test_another_form_is_refused(collision: Run, tmp_path: Path) -> None:
         export_run(collision, tmp_path / "out", "xls")
 
 
+@pytest.mark.parametrize(("name", "form"), [("run.mcap", "csv"), ("run.npz", "mcap")])
+def test_a_target_named_after_another_form_is_refused(collision: Run, tmp_path: Path, name: str, form: str) -> None:
+    with pytest.raises(RecordingError, match=rf"{name} is named as {name[4:]}, but the format is {form}: name another"):
+        export_run(collision, tmp_path / name, form)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["out", "run.npz", "run.mcap"])
+def test_a_run_without_anything_is_no_export(collision: Run, tmp_path: Path, name: str) -> None:
+    with pytest.raises(RecordingError, match="nothing is exported"):
+        export_run(replace(collision, blocks=()), tmp_path / "new" / name)
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
 @pytest.mark.parametrize("form", ["csv", "parquet", "npz", "mcap"])
 def test_an_export_that_fails_leaves_nothing_torn(
     collision: Run, tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch

@@ -92,7 +92,7 @@ def test_a_run_that_kills_its_process_does_not_take_the_others_with_it(runs: lis
 
 
 _ON_A_CLUSTER = """
-import json, logging, sys
+import json, logging, socket, sys
 from pathlib import Path
 
 import distributed
@@ -106,10 +106,14 @@ if __name__ == "__main__":
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         rows = judge_runs(paths, variants, scheduler=cluster.scheduler_address)
         batch._CONNECT_TIMEOUT = 0.5
-        try:
-            judge_runs(paths, variants, scheduler="tcp://127.0.0.1:1")
-        except RecordingError as exc:
-            print(json.dumps([rows, str(exc)]))
+        mute = socket.create_server(("127.0.0.1", 0))
+        said = []
+        for address in ("tcp://127.0.0.1:1", "nonsense", f"tcp://127.0.0.1:{mute.getsockname()[1]}", "foo://localhost:1"):
+            try:
+                judge_runs(paths, variants, scheduler=address)
+            except RecordingError as exc:
+                said.append(str(exc))
+        print(json.dumps([rows, said]))
 """
 
 
@@ -125,7 +129,10 @@ def test_a_local_cluster_says_the_same(runs: list[Path], tmp_path: Path) -> None
     rows, said = json.loads(done.stdout.splitlines()[-1])
     check(rows)
     assert rows == json.loads(json.dumps(judge_runs(runs, VARIANTS, jobs=1)))
-    assert said.startswith("the Dask scheduler tcp://127.0.0.1:1 cannot be reached")
+    assert [line.split(" ")[3] for line in said[:2]] == ["tcp://127.0.0.1:1", "nonsense"]
+    assert len(said) == 4
+    assert all("cannot be reached: " in line and "start `dask scheduler`" in line for line in said)
+    assert "timed out" in said[2]
 
 
 def test_no_jobs_are_refused(runs: list[Path]) -> None:

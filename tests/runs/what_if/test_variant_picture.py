@@ -13,10 +13,10 @@ from coneskin.runs.what_if.variant_table import VariantScore, score_variants, sh
 def test_each_variant_is_a_point_with_its_name(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     scores = [
-        VariantScore("level=0.06", 9, 0, 1, 20, 0, 3, 0.002, 0.004, 1.0),
-        VariantScore("level=$0.2$", 9, 0, 1, 20, 4, 0, 0.008, 0.02, 1.0),
-        VariantScore("level=0.9", 9, 0, 1, 20, 20, 0, math.nan, math.nan, 1.0),
-        VariantScore("level=-1", 0, 9, 0, 0, 0, 0, math.nan, math.nan, 0.0),
+        VariantScore("level=0.06", 9, 0, 1, 20, 0, 3, 0, 0.002, 0.004, 1.0),
+        VariantScore("level=$0.2$", 9, 0, 1, 20, 4, 0, 0, 0.008, 0.02, 1.0),
+        VariantScore("level=0.9", 9, 0, 1, 20, 20, 0, 0, math.nan, math.nan, 1.0),
+        VariantScore("level=-1", 0, 9, 0, 0, 0, 0, 0, math.nan, math.nan, 0.0),
     ]
     path = tmp_path / "delay.svg"
     from matplotlib import rc_context
@@ -39,7 +39,7 @@ def test_variants_at_one_point_do_not_lie_on_each_other(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     from matplotlib import rc_context
 
-    same = [VariantScore(f"level={level}", 9, 0, 1, 20, 0, 3, 0.002, 0.004, 1.0) for level in (0.06, 0.08)]
+    same = [VariantScore(f"level={level}", 9, 0, 1, 20, 0, 3, 0, 0.002, 0.004, 1.0) for level in (0.06, 0.08)]
     with rc_context({"svg.fonttype": "none"}):
         draw_variants(same, tmp_path / "delay.svg")
     drawn = (tmp_path / "delay.svg").read_text(encoding="utf-8")
@@ -54,7 +54,7 @@ def test_what_all_variants_share_is_said_once() -> None:
     assert shared_settings(names) == (["a.b=1"], ["c.d=2", "c.d=3", "without more"])
     assert shared_settings(names[:1]) == ([], names[:1])
     assert shared_settings([]) == ([], [])
-    lines = variant_lines([VariantScore(name, 9, 0, 1, 20, 0, 3, 0.002, 0.004, 1.0) for name in names])
+    lines = variant_lines([VariantScore(name, 9, 0, 1, 20, 0, 3, 0, 0.002, 0.004, 1.0) for name in names])
     assert lines[0] == "all with a.b=1"
     assert [line.split("  ")[0] for line in lines[2:]] == ["c.d=2", "c.d=3", "without more"]
 
@@ -67,6 +67,7 @@ def test_a_delay_is_against_the_truth_where_some_run_tells_it() -> None:
         "touches": 1,
         "missed": 0,
         "false_alarms": 0,
+        "unlabeled": 0,
         "duration_s": 1.0,
     }
     recorded = {**fixed, "truth": "recorded", "delay_median_ms": 0.0, "delay_max_ms": 0.0}

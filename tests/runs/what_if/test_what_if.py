@@ -17,6 +17,7 @@ from coneskin.runs.cut import cut_run
 from coneskin.runs.decisions import Decisions
 from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.what_if.what_if import (
+    _judge,
     _read_labels,
     _recorded_labels,
     _score_detection,
@@ -150,6 +151,10 @@ def test_recorded_contacts_are_labels_until_the_touch_is_over() -> None:
     assert second[:2] == (3.0, float("inf"))
     early = _score_detection(contacts(0.9, 3.0), [first, second])
     assert (early.missed, early.false_alarms) == (0, 0)
+    more = _judge(contacts(1.0), contacts(1.0, 9.0), [first], "recorded")  # touched, or a false alarm: no one knows
+    assert (more["touches"], more["false_alarms"], more["unlabeled"]) == (1, 0, 1)
+    told = _judge(contacts(1.0), contacts(1.0, 9.0), [first], "labels")
+    assert (told["false_alarms"], told["unlabeled"]) == (1, 0)
     assert early.delays == pytest.approx((-0.1, 0.0))
 
 

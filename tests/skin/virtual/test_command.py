@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+import os
 import subprocess
 import sys
 import time
@@ -113,6 +114,14 @@ def test_a_file_needs_an_end_and_a_place(tmp_path):
         run("--output", str(tmp_path / "x"))
     with pytest.raises(SkinConnectionError, match="cannot be written"):
         run("--output", str(tmp_path / "no" / "x"), "--duration-s", "1")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_that_nobody_reads_is_refused_at_once(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(SkinConnectionError, match="pipe: nobody reads this pipe: start its reader first"):
+        run("--duration-s", "0.01", "--output", str(pipe))
 
 
 def test_a_mistake_is_one_line_of_usage(capsys):

@@ -268,7 +268,7 @@ def polar_text(flat: Sector) -> str:
     )
 
 
-LEAST_ACTIVE_SHARE = 0.25  #: of a sheet; where less is active, it costs four wires and feels touches hardly anywhere
+LEAST_ACTIVE_SHARE = 0.30  #: of a sheet; where less is active, it costs four wires and feels touches hardly anywhere
 
 
 def small_active_area(design: SheetDesign) -> str:

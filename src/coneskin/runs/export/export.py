@@ -101,42 +101,57 @@ def _array(values: Sequence[Any]) -> NDArray[Any]:
 FORMATS = ("csv", "parquet", "npz", "mcap")
 
 
-def export_run(run: Run, target: Path, form: str, progress: Progress = silent) -> dict[Path, int]:
+def export_run(run: Run, target: Path, form: str | None = None, progress: Progress = silent) -> dict[Path, int]:
     """Write a run for other programs.
 
     Args:
         run: the run.
         target: csv, parquet: folder for one file for each table; it is made. npz, mcap: the file.
-        form: one of ``FORMATS``.
+        form: one of ``FORMATS``; None: as the target's name ends, else csv.
         progress: called now and then with the fraction of the skin's frames that is done.
 
     Returns:
         file -> its number of rows or messages.
 
     Raises:
-        RecordingError: the form is another, a file is there already, or cannot be written.
+        RecordingError: the form is another, or not the one that the target is named after; a file is there already, or
+            cannot be written; the run has nothing to export.
         MissingExtra: a package that the form needs is not installed.
     """
+    named = target.suffix[1:].lower()
+    form = form or (named if named in FORMATS else "csv")
     if form not in FORMATS:
         raise RecordingError(f"a run is exported as {', '.join(FORMATS)}, got {form!r}")
+    if named in FORMATS and named != form:
+        raise RecordingError(f"{target} is named as {named}, but the format is {form}: name another, or choose {named}")
     if target.exists() and (target.is_file() or form in ("npz", "mcap")):
         raise RecordingError(f"{target} is there already; nothing is overwritten: name another")
     try:
         if form in ("csv", "parquet"):
             from .parquet_file import write_parquet
 
-            return _write_folder(
-                target, table_pieces(run, progress), form, _write_csv if form == "csv" else write_parquet
-            )
+            write = _write_csv if form == "csv" else write_parquet
+            if not (written := _write_folder(target, table_pieces(run, progress), form, write)):
+                raise _nothing(run)
+            return written
         target.parent.mkdir(parents=True, exist_ok=True)
         with draft_of(target) as draft:
             if form == "npz":
-                return {target: _write_npz(draft, table_pieces(run, progress))}
-            from .mcap_file import write_mcap
+                rows = _write_npz(draft, table_pieces(run, progress))
+            else:
+                from .mcap_file import write_mcap
 
-            return {target: write_mcap(run, draft, progress)}
+                rows = write_mcap(run, draft, progress)
+            if not rows:
+                raise _nothing(run)
+            return {target: rows}
     except OSError as exc:
         raise RecordingError(f"cannot write {target}: {exc.strerror or exc}") from exc
+
+
+def _nothing(run: Run) -> RecordingError:
+    lost = f": {run.missing}" if run.missing else ""
+    return RecordingError(f"the run has no events, frames, states or commands, so nothing is exported{lost}")
 
 
 def _write_folder(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import concurrent.futures
 import multiprocessing
 import os
+import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -17,7 +18,7 @@ from .what_if import broken_rows, judge_run
 
 __all__ = ["judge_runs"]
 
-_CONNECT_TIMEOUT = 30.0  # s
+_CONNECT_TIMEOUT = 5.0  # s
 
 
 Rows = list[dict[str, Any]]
@@ -31,12 +32,21 @@ def _judge_on_cluster(
     """Yield each run with its rows, as the workers finish them. One on which a worker dies three times is an error."""
     try:
         from distributed import Client, as_completed
+        from distributed.comm.addressing import parse_address, parse_host_port
     except ImportError as exc:
         raise MissingExtra("distributed", "a Dask cluster", "dask") from exc
     try:
+        scheme, place = parse_address(address)
+        # where no scheduler answers, a client hangs for minutes
+        with socket.create_connection(parse_host_port(place), _CONNECT_TIMEOUT) as line:
+            if scheme == "tcp" and not line.recv(1):  # a scheduler speaks first
+                raise ConnectionError("the line was closed")
         client = Client(address, timeout=_CONNECT_TIMEOUT, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as exc:
-        raise RecordingError(f"the Dask scheduler {address} cannot be reached: {exc}") from exc
+    except (OSError, ValueError, OverflowError) as exc:
+        raise RecordingError(
+            f"the Dask scheduler {address} cannot be reached: {exc}; start `dask scheduler`, and name the address that "
+            "it tells, such as tcp://10.0.0.5:8786"
+        ) from exc
     with client:
         futures = {}
         for number, path in enumerate(paths):

@@ -23,7 +23,8 @@ class VariantScore(NamedTuple):
         changed: runs whose decisions differ from the recorded ones.
         touches: that there were.
         missed: of them.
-        false_alarms: contacts without a touch.
+        false_alarms: contacts without a touch, in runs of which someone knows what touched them.
+        unlabeled: contacts beyond the recorded ones in other runs, touches or false alarms.
         delay: median of the runs' median delays [s]; NaN without any. Runs of which nobody knows what touched them
             count where there are no others.
         worst_delay: the largest [s].
@@ -37,6 +38,7 @@ class VariantScore(NamedTuple):
     touches: int
     missed: int
     false_alarms: int
+    unlabeled: int
     delay: float
     worst_delay: float
     hours: float
@@ -47,6 +49,7 @@ class VariantScore(NamedTuple):
         return {
             **{name: getattr(self, name) for name in ("variant", "runs", "broken", "changed", "touches", "missed")},
             "false_alarms": self.false_alarms,
+            "unlabeled": self.unlabeled,
             **{name: None if math.isnan(value) else 1e3 * value for name, value in milliseconds.items()},
             "hours": self.hours,
         }
@@ -71,6 +74,7 @@ def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:
                 sum(row["touches"] for row in good),
                 sum(row["missed"] for row in good),
                 sum(row["false_alarms"] for row in good),
+                sum(row["unlabeled"] for row in good),
                 1e-3 * statistics.median(delays) if delays else math.nan,
                 1e-3 * max(worst) if worst else math.nan,
                 sum(row["duration_s"] for row in good) / 3600.0,
@@ -84,11 +88,13 @@ def variant_lines(scores: Sequence[VariantScore]) -> list[str]:
     shared, names = shared_settings([score.variant for score in scores])
     width = max([7, *map(len, names)])
     lines = [f"all with {', '.join(shared)}"] if shared else []
-    lines.append(f"{'variant':{width}}  runs  broken  changed  touches  missed  false alarms  delay (median)  (worst)")
+    lines.append(
+        f"{'variant':{width}}  runs  broken  changed  touches  missed  false alarms  unlabeled  delay (median)  (worst)"
+    )
     for name, s in zip(names, scores, strict=True):
         lines.append(
             f"{name:{width}}  {s.runs:4}  {s.broken:6}  {s.changed:7}  {s.touches:7}  {s.missed:6}  "
-            f"{s.false_alarms:12}  {_ms(s.delay):>14}  {_ms(s.worst_delay):>7}"
+            f"{s.false_alarms:12}  {s.unlabeled:9}  {_ms(s.delay):>14}  {_ms(s.worst_delay):>7}"
         )
     return lines
 

@@ -220,7 +220,8 @@ def judge_run(
 
     The columns: run, path, variant, error, complete, same (as recorded, bit by bit but for the last), first_difference,
     contacts, stops, diverged_s, moved_mm, truth ("labels" of a person, what a "virtual skin" was touched with, or the
-    contacts that were "recorded"), touches, missed, false_alarms, delay_median_ms, delay_max_ms, duration_s.
+    contacts that were "recorded"), touches, missed, false_alarms, unlabeled (contacts beyond the recorded ones where
+    these are the truth: no one knows whether they are false alarms), delay_median_ms, delay_max_ms, duration_s.
     """
     fixed = {"run": run_name(path), "path": str(path)}
     try:
@@ -243,7 +244,7 @@ def judge_run(
         except ConeSkinError as exc:
             rows.append(_row(**fixed, variant=name, error=str(exc)))
             continue
-        facts = _judge(recorded, again, labels)
+        facts = _judge(recorded, again, labels, truth)
         rows.append(_row(**fixed, variant=name, complete=run.complete, duration_s=duration, **facts))
     return rows
 
@@ -265,7 +266,7 @@ def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel]
     return [touch for touch in touches if touch.end > since and touch.start < until - _SEEING_TIME], "virtual skin"
 
 
-def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel]) -> dict[str, Any]:
+def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel], truth: str) -> dict[str, Any]:
     comparison = compare_decisions(recorded, again)
     score = _score_detection(again, labels)
     median = score.median_delay
@@ -278,7 +279,8 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel])
         "moved_mm": 1e3 * comparison.farthest,
         "touches": score.touches,
         "missed": score.missed,
-        "false_alarms": score.false_alarms,
+        "false_alarms": 0 if truth == "recorded" else score.false_alarms,
+        "unlabeled": score.false_alarms if truth == "recorded" else 0,
         "delay_median_ms": None if median is None else 1e3 * median,
         "delay_max_ms": 1e3 * max(score.delays) if score.delays else None,
     }
@@ -286,7 +288,17 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel])
 
 _TABLE_COLUMNS = (
     *("run", "path", "variant", "error", "complete", "same", "first_difference", "contacts", "stops", "diverged_s"),
-    *("moved_mm", "truth", "touches", "missed", "false_alarms", "delay_median_ms", "delay_max_ms", "duration_s"),
+    *(
+        "moved_mm",
+        "truth",
+        "touches",
+        "missed",
+        "false_alarms",
+        "unlabeled",
+        "delay_median_ms",
+        "delay_max_ms",
+        "duration_s",
+    ),
 )
 
 
