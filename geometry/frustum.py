@@ -2,8 +2,8 @@
 
 Symbols (docs/understand/conventions.md): rho1, rho2 radii, h height, s slant, a half angle;
 d = rho2 - rho1 = s sin a, h = s cos a.
-A method in the singular takes numbers, one place, and loads no numpy: the live loop calls it. ``points``, ``normals``
-and ``flat_points`` take arrays; ``PlacedFrustum.locate_all`` is the inverse for arrays.
+A method in the singular takes numbers, one place, and loads no numpy: the live loop calls it. ``points`` and
+``normals`` take arrays; ``PlacedFrustum.locate_all`` is the inverse for arrays.
 Everything is written in the surface coordinates (u, phi), not in the polar coordinates (r, theta) of the flat sector,
 because r grows without bound as a cone becomes a cylinder and real links are mostly cylinders. In (u, phi) the
 cylinder, the cone with its apex, the disc and the narrowing cone are ordinary values of one formula.
@@ -131,8 +131,6 @@ class Frustum:
     def flat_point(self, u: float, phi: float) -> tuple[float, float]:
         """Return the point of the flat pattern, isometric to the side and regular for every half angle.
 
-        Of one place; ``flat_points`` takes arrays.
-
         Args:
             u: slant distance from end 1 [m].
             phi: azimuth [rad].
@@ -144,28 +142,6 @@ class Frustum:
         rho = self.radius_at(u)
         half = 0.5 * phi * sa
         return rho * phi * sinc(phi * sa), u - rho * phi * math.sin(half) * sinc(half)
-
-    def locate_flat(self, x: float, y: float) -> tuple[float, float]:
-        """Return the surface coordinates (u [m], phi [rad]) of a point of the flat pattern.
-
-        The inverse of ``flat_point``, for one point.
-
-        Args:
-            x: as ``flat_point`` returns it [m].
-            y: as ``flat_point`` returns it [m].
-        """
-        sa, rho1 = self.sin_half_angle, self.radius1
-        along, across = rho1 + sa * y, sa * x
-        rho = math.hypot(across, along)
-        if rho + rho1 == 0.0:
-            return 0.0, 0.0
-        u = (sa * (x * x + y * y) + 2.0 * rho1 * y) / (rho1 + rho)
-        if along > 0.0 and abs(across) <= 1e-3 * along and self.wrap * abs(sa) < 1.0:
-            t = across / along  # atan2(across, along) / sa, without the division by a vanishing sa
-            return u, x / along * (math.atan(t) / t if t else 1.0)
-        q = abs(sa)
-        angle = math.atan2(math.copysign(1.0, sa) * across, along)
-        return u, self._branch(angle, self.wrap * q) / q
 
     @staticmethod
     def _branch(angle: float, span: float) -> float:
@@ -188,18 +164,6 @@ class Frustum:
         phi = np.asarray(phi, float)
         ca = self.cos_half_angle
         return np.stack([ca * np.cos(phi), ca * np.sin(phi), np.full_like(phi, -self.sin_half_angle)], axis=-1)
-
-    def flat_points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-        """Return the points of the flat pattern for arrays u [m], phi [rad] that broadcast: shape (..., 2) [m]."""
-        import numpy as np
-
-        u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
-        s, sa = self.slant, self.sin_half_angle
-        rho = ((s - u) * self.radius1 + u * self.radius2) / s
-        half = 0.5 * phi * sa  # np.sinc(t) is sin(pi t) / (pi t)
-        x = rho * phi * np.sinc(phi * sa / np.pi)
-        y = u - rho * phi * np.sin(half) * np.sinc(half / np.pi)
-        return np.stack([x, y], axis=-1)
 
 
 def sinc(x: float) -> float:

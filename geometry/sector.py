@@ -51,18 +51,6 @@ class Sector:
                 f"arc1, arc2, theta0 and slant must satisfy |arc2 - arc1| = theta0 * slant, they differ by {gap!r} m"
             )
 
-    @classmethod
-    def from_radii(cls, r1: float, r2: float, theta0: float) -> Sector:
-        """Make a sector from radii r1 (end 1), r2 (end 2) [m] and the central angle theta0 [rad], as in the paper.
-
-        Raises:
-            GeometryError: a value is not finite and positive, or r1 equals r2.
-        """
-        for name, value in (("r1", r1), ("r2", r2), ("theta0", theta0)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise GeometryError(f"{name} must be finite and not negative, got {value!r}")
-        return cls(abs(r2 - r1), r1 * theta0, r2 * theta0, theta0)
-
     @property
     def r1(self) -> float:
         """Polar radius of end 1 [m]; infinite for a rectangle."""

@@ -9,6 +9,7 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import unroll
 from coneskin.skin.sensor import Sensor
+from tests.support.flat_pattern import locate_flat
 from tests.support.paths import ROOT
 
 DOCUMENT = (ROOT / "docs" / "understand" / "conventions.md").read_text(encoding="utf-8")
@@ -59,8 +60,8 @@ def test_flat_x_flat_y_and_the_outward_normal_are_right_handed(cone: Frustum) ->
     u, phi, step = 0.07, 1.2, 1e-6
     x, y = cone.flat_point(u, phi)
     here = cone.point(u, phi)
-    along_x = [(b - a) / step for a, b in zip(here, cone.point(*cone.locate_flat(x + step, y)), strict=True)]
-    along_y = [(b - a) / step for a, b in zip(here, cone.point(*cone.locate_flat(x, y + step)), strict=True)]
+    along_x = [(b - a) / step for a, b in zip(here, cone.point(*locate_flat(cone, x + step, y)), strict=True)]
+    along_y = [(b - a) / step for a, b in zip(here, cone.point(*locate_flat(cone, x, y + step)), strict=True)]
     cross = (
         along_x[1] * along_y[2] - along_x[2] * along_y[1],
         along_x[2] * along_y[0] - along_x[0] * along_y[2],

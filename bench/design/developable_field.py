@@ -118,7 +118,8 @@ def shape_error(place: PlacedFrustum, height: float) -> tuple[float, float]:
     """Return how far the places of a flat sector are from those of the exact pattern, worst and rms [m]."""
     u, phi = np.linspace(0.0, place.frustum.slant, 41), np.linspace(0.0, place.frustum.wrap, 401)
     above = np.array([place.azimuth_above(height, value) for value in phi * (1.0 - 1e-12)])
-    sector = place.parallel(height).frustum.flat_points(u[:, None], above[None]).reshape(-1, 2)
+    flat = place.parallel(height).frustum.flat_point
+    sector = np.array([flat(a, b) for a in u for b in above])
     exact = exact_pattern(place, height, u, phi).reshape(-1, 2)
     one, two = sector - sector.mean(axis=0), exact - exact.mean(axis=0)
     left, _, right = np.linalg.svd(one.T @ two)

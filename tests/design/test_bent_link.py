@@ -16,6 +16,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.build import place_on_arm
 from coneskin.skin.detection.events import TouchEnded
 from coneskin.skin.wire import encode
+from tests.support.flat_pattern import locate_flat
 from tests.support.ruled_tube import oval_tube
 
 TURN = 2.0 * math.pi
@@ -75,7 +76,7 @@ def test_printed_crosses_lie_above_the_places_that_a_calibration_expects(place: 
     cover, active = design.cuts[6], design.active.frustum
     lines = [s.outline for s in cover.parts[0].strokes if s.kind == "score"][1:]
     middles = [np.mean([(x, y) for x, y, _ in line.vertices], axis=0) for line in lines[::2]]
-    u, phi = np.array([cover.surface.locate_flat(x, y) for x, y in middles]).T
+    u, phi = np.array([locate_flat(cover.surface, x, y) for x, y in middles]).T
     phi = phi + 0.5 * cover.surface.wrap  # a drawing begins in the middle
     above = place.parallel(design.options.stack.offset(4))
     assert above.frustum == cover.surface

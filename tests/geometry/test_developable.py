@@ -13,6 +13,7 @@ from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
+from tests.support.flat_pattern import locate_flat
 
 TURN = 2.0 * math.pi
 POSE = Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, -0.5, 0.6))
@@ -89,7 +90,7 @@ def test_a_straight_line_of_the_flat_pattern_keeps_its_length_and_is_a_geodesic(
     one, two = frustum.flat_point(0.1 * frustum.slant, 0.05), frustum.flat_point(0.8 * frustum.slant, 0.5)
     parts = np.linspace(0.0, 1.0, 20_001)
     flat = np.outer(1.0 - parts, one) + np.outer(parts, two)
-    u, phi = np.array([frustum.locate_flat(x, y) for x, y in flat]).T
+    u, phi = np.array([locate_flat(frustum, x, y) for x, y in flat]).T
     line = side.place(u, phi)[0]
     assert np.linalg.norm(np.diff(line, axis=0), axis=1).sum() == pytest.approx(math.dist(one, two), rel=1e-8)
     before, at, after = line[100:19800:400], line[150:19850:400], line[200:19900:400]

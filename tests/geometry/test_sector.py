@@ -48,7 +48,7 @@ def test_published_cone():
 
 def test_paper_sector_rolls_into_a_link():
     """r1 = 100, r2 = 200 mm, theta0 = 90 deg (read off the paper's figures) wraps a cone of 25 and 50 mm."""
-    link = roll_up(Sector.from_radii(0.1, 0.2, math.pi / 2))
+    link = roll_up(Sector(0.1, 0.1 * math.pi / 2, 0.2 * math.pi / 2, math.pi / 2))
     assert (link.radius1, link.radius2) == (pytest.approx(0.025), pytest.approx(0.05))
     assert link.half_angle == pytest.approx(math.asin(0.25))
 
@@ -57,9 +57,9 @@ def test_impossible_sectors_are_refused():
     with pytest.raises(GeometryError, match=r"\|arc2 - arc1\| = theta0 \* slant"):
         Sector(1.0, 1.0, 2.0, 0.5)
     with pytest.raises(GeometryError, match="needs a slant"):
-        Sector.from_radii(0.1, 0.1, 1.0)
+        Sector(0.0, 0.1, 0.1, 1.0)
     with pytest.raises(GeometryError, match="wrap must be at least theta0"):
-        roll_up(Sector.from_radii(0.1, 0.2, 2.0), 1.0)
+        roll_up(Sector(0.1, 0.2, 0.4, 2.0), 1.0)
 
 
 def test_numbers_of_numpy_become_floats() -> None:
@@ -69,6 +69,6 @@ def test_numbers_of_numpy_become_floats() -> None:
     frustum = Frustum(np.float64(0.04), np.float32(0.0625), np.int64(1), np.float64(2.0))
     assert repr(frustum) == "Frustum(radius1=0.04, radius2=0.0625, height=1.0, wrap=2.0)"
     assert "np." not in repr(unroll(frustum))
-    sector = Sector.from_radii(np.float64(0.25), np.float64(0.5), np.float64(1.0))
+    sector = Sector(np.float64(0.25), np.float64(0.25), np.float32(0.5), np.int64(1))
     assert repr(sector) == "Sector(slant=0.25, arc1=0.25, arc2=0.5, theta0=1.0)"
     assert "np." not in repr(roll_up(sector, np.float64(2.0)))

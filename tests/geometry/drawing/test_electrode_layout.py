@@ -12,6 +12,7 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from tests.support.flat_pattern import locate_flat
 from tests.support.sweep import sweep
 
 from ..planar import dense, distance, distances, inside
@@ -71,7 +72,7 @@ def test_electrodes_of_a_sheet_keep_apart_and_leads_keep_off_their_sheet(name, s
             span = {"A": (far.u1, far.u2 - 1e-3), "B": (far.u1 + 1e-3, far.u2)}.get(across)
             keep = []
             for point in lead:
-                u, phi = cone.locate_flat(*shifted(cone, point))
+                u, phi = locate_flat(cone, *shifted(cone, point))
                 if span and span[0] <= u <= span[1]:
                     keep.append(point)
                 if across == "C" and far.phi1 <= phi <= far.phi2 - 1e-3 / layout.sheet.radius_at(0.0) * 2:
@@ -152,7 +153,7 @@ def test_edge_electrodes_are_wedges_between_rays(name):
                 for s in draw_shape(cone, layout.foils[which]).segments()
                 if s.bulge == 0.0
                 and s.length > 0.5 * cone.slant
-                and abs(cone.locate_flat(*shifted(cone, s.at(0.5)))[1] - phi) < 0.01
+                and abs(locate_flat(cone, *shifted(cone, s.at(0.5)))[1] - phi) < 0.01
             ]
             for segment in near:
                 a, b = complex(*segment.start), complex(*segment.end)

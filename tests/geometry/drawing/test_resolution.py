@@ -15,7 +15,7 @@ from coneskin.skin.electronics import GivenElectronics
 
 mp.mp.dps = 40
 #: the sector that the paper's figures imply: 100 and 200 mm, 90 deg, rolled to a quarter of a turn: a flat disc
-PAPER = roll_up(Sector.from_radii(0.1, 0.2, math.pi / 2), math.pi / 2)
+PAPER = roll_up(Sector(0.1, 0.05 * math.pi, 0.1 * math.pi, math.pi / 2), math.pi / 2)
 
 
 def test_the_papers_sector_with_12_bits():
