@@ -79,7 +79,7 @@ def test_a_guard_ends_with_the_replay_of_what_it_has_recorded(
 def test_the_demo_ends_with_the_replay_of_its_run(capsys: pytest.CaptureFixture[str]) -> None:
     folder = Path("runs") / "of two words"
     facts = _collision_facts(Run({}, ()), 0.0)
-    facts |= {"peak_n": None, "clamp_n": None, "same_in_replay": True, "picture": None}
+    facts |= {"same_in_replay": True, "picture": None}
     _print_report(facts, folder, "")
     said = shlex.split(capsys.readouterr().out.splitlines()[-1])
     assert said == ["next:", "coneskin", "replay", str(folder), "--events"]

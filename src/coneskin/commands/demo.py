@@ -1,14 +1,12 @@
-"""``coneskin demo``: a simulated arm runs into something soft, and its skin makes it stop and retreat. No hardware.
+"""``coneskin demo``: the skin of a simulated arm is touched, and the arm stops and retreats. No hardware.
 
-The force comes from the physics engine, in real time; where that is not installed, a script touches the skin.
-Everything between the two ends is the real thing: bytes through a pseudo-terminal and pyserial, the guard in its own
-process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
+A script touches the skin. Everything else is the real thing: bytes through a pseudo-terminal and pyserial, the guard in
+its own process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import math
 import shlex
@@ -24,27 +22,20 @@ from coneskin.core.errors import (
     ConeSkinError,
     MissingExtra,
     RecordingError,
-    RobotConnectionError,
     RobotRefused,
 )
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
-from coneskin.scene.required_packages import has_physics_engine
 
 from .terminal import print_hint, print_line
 
 if TYPE_CHECKING:
-    import socket
     from collections.abc import Callable
 
     from coneskin.core.recording.block import Block
-    from coneskin.impact.simulation.impact_outcome import ImpactOutcome
-    from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.runs.replay.run import Run
-    from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
-    from coneskin.session.session import Session
 
 __all__ = ["add_arguments", "run"]
 
@@ -80,61 +71,21 @@ skin_silence_ms = 1000
 skin_late_ms = 1000
 arm_silence_ms = 1000
 program_silence_ms = 1000
-{more}"""
-#: with physics: servos follow 10 ms late, and what they do comes from one more process
-_FRAME_TIMEOUT = "escalate_ms = 100"
-#: what it runs into, half way; as heavy as a hand (ISO/TS 15066, table A.3), and much softer
-_BODY_TEXT = """
-[[body]]
-kind = "hand"
-xyz_mm = [{x:.1f}, {y:.1f}, {z:.1f}]
-radius_mm = {radius_mm:g}
-mass_kg = 0.6
-stiffness_n_per_mm = 2
 """
-_LINK_RADIUS = 0.03  # m of that
 _TOUCHED_U = 0.13  #: m; slant distance of the touch from end 1
 _FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  #: joint positions at the start
 _TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  #: joint positions at the end
 
 
-def _make_scene(host: str, reaction: str, soft: bool, folder: Path) -> Scene:
-    """Return the scene of the demo, in which the arm runs into something soft, or a script touches it."""
-    from coneskin.scene.reader import parse_scene
-
-    text = _SCENE_TEXT.format(host=host, reaction=reaction, more=_FRAME_TIMEOUT if soft else "")
-    scene = parse_scene(text, "scene.toml", folder)
-    return parse_scene(text + _body_in_the_way(scene), "scene.toml", folder) if soft else scene
-
-
-def _half_way(scene: Scene) -> tuple[ArmModel, SensorOnArm, list[float]]:
-    """Return the arm, the sensor on it, and the joint positions half way [rad]."""
-    from coneskin.robot.arm.models import arm_model
-    from coneskin.scene.build import place_on_arm
-
-    (placed,) = place_on_arm(scene)
-    assert scene.arm is not None
-    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
-    return arm_model(scene.arm.model), placed, middle
-
-
-def _body_in_the_way(scene: Scene) -> str:
-    """Return the table of a body that the sensor's leading side meets half way."""
-    from coneskin.robot.arm.kinematics import link_pose
-
-    arm, placed, middle = _half_way(scene)
-    point, normal = placed.place(_TOUCHED_U, _leading_side(scene))
-    pose = link_pose(arm, middle, placed.link)
-    out = pose.rotate(normal)
-    x, y, z = (1e3 * (p + _LINK_RADIUS * n) for p, n in zip(pose.apply(point), out, strict=True))
-    return _BODY_TEXT.format(x=x, y=y, z=z, radius_mm=1e3 * _LINK_RADIUS)
-
-
 def _leading_side(scene: Scene) -> float:
     """Return the azimuth of the sensor's leading side [rad]: there an obstacle would hit the arm."""
     from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+    from coneskin.robot.arm.models import arm_model
+    from coneskin.scene.build import place_on_arm
 
-    arm, placed, middle = _half_way(scene)
+    assert scene.arm is not None
+    (placed,), arm = place_on_arm(scene), arm_model(scene.arm.model)
+    middle = [math.radians(0.5 * (a + b)) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
     qd = [math.radians(b - a) for a, b in zip(_FROM_DEG, _TO_DEG, strict=True)]
 
     def towards(phi: float) -> float:
@@ -211,8 +162,6 @@ def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     ):
         value = facts[key]
         print(f"  {'never' if value is None else f'{value:8.2f} ms'}  {words}")
-    if facts["peak_n"] is not None:
-        print(f"  {facts['peak_n']:8.1f} N   peak force on the body; {facts['clamp_n']:.1f} N at most 0.5 s later")
     if facts["retreat_mm"] is not None:
         print(f"  {facts['way']}, along the normal")
     if facts["cut_short"] is not None:
@@ -257,6 +206,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     from coneskin.robot.sim.process import free_host
     from coneskin.runs.replay.run import read_run
+    from coneskin.scene.reader import parse_scene
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
     try:
@@ -264,8 +214,7 @@ def run(args: argparse.Namespace) -> int:
     except OSError as exc:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = args.host or free_host()
-    soft = has_physics_engine()
-    scene = _make_scene(host, args.reaction, soft, folder)
+    scene = parse_scene(_SCENE_TEXT.format(host=host, reaction=args.reaction), "scene.toml", folder)
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
 
     def say(line: str) -> None:
@@ -273,12 +222,10 @@ def run(args: argparse.Namespace) -> int:
             print_line(line)
 
     say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
-    if not soft:
-        say("a script touches it: to let it run into something soft, pip install 'coneskin[physics]'")
     if scene.moves_away:
         _commission(scene, say)
     try:
-        touched, force = _meet(scene, soft, folder, say)
+        touched = _touch_by_script(scene, folder, say)
     except ConeSkinError as exc:
         if cause := _cause(folder):
             raise RobotRefused(f"{cause}. What followed: {exc}") from exc
@@ -286,7 +233,6 @@ def run(args: argparse.Namespace) -> int:
     recorded = read_run(folder)
     again = recorded.replay()
     facts = _collision_facts(recorded, touched)
-    facts["peak_n"], facts["clamp_n"] = (None, None) if force is None else (round(force.peak, 1), round(force.clamp, 1))
     facts["same_in_replay"] = again.same
     facts["picture"] = _draw(recorded, folder, say)
     (folder / "summary.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
@@ -294,36 +240,10 @@ def run(args: argparse.Namespace) -> int:
         print(json.dumps({**facts, "folder": str(folder)}))
     else:
         _print_report(facts, folder, recorded.missing)
-    alone = facts["contacts"] == 1 or (soft and facts["contacts"] > 1)  # what is soft may swing back
-    as_it_should = facts["standstill_ms"] is not None and again.same and alone
+    as_it_should = facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1
     if (not as_it_should or facts["cut_short"]) and (cause := _hold_up(recorded.blocks)):
         print(f"coneskin demo: {cause}", file=sys.stderr)
     return 0 if as_it_should else 1
-
-
-def _meet(scene: Scene, soft: bool, folder: Path, say: Callable[[str], None]) -> tuple[float, ImpactOutcome | None]:
-    """Let the arm run into something; return when that began [s], and with which forces where physics is there."""
-    from coneskin.robot.sim.process import SimulatedController
-
-    assert scene.arm is not None
-    start_q = [math.radians(q) for q in _FROM_DEG]
-    with contextlib.ExitStack() as stack:
-        plant = None
-        if soft:
-            from coneskin.impact.simulation.live_plant import LivePlant
-
-            plant = stack.enter_context(LivePlant(scene, start_q))
-        line = None if plant is None else plant.controller
-        controller = stack.enter_context(SimulatedController("UR5e", scene.arm.host, start_q, plant=line))
-        if plant is None:
-            return _touch_by_script(scene, folder, say), None
-        _collide(scene, folder, say, lambda _: None, plant.skin)
-        if lost := controller.state()["plant_lost"]:
-            raise RobotConnectionError(f"the simulated arm was lost: {lost}")
-        force, touched = plant.outcome()
-        if math.isnan(touched):
-            raise RobotRefused("the arm met nothing, though there is a body in its way")
-        return touched, force
 
 
 def _cause(folder: Path) -> str:
@@ -380,43 +300,26 @@ def _commission(scene: Scene, say: Callable[[str], None]) -> None:
         raise RobotRefused(f"the virtual skin has not passed its commissioning: {record.cause}")
 
 
-def _collide(
-    scene: Scene,
-    folder: Path,
-    say: Callable[[str], None],
-    meanwhile: Callable[[Session], None],
-    pressed_by: socket.socket | None = None,
-) -> None:
-    """Move, print what the guard does, and call a function as the motion begins."""
+def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
+    """Touch the arm while it moves, and print what the guard does; return when the touch began [s]."""
+    from coneskin.robot.sim.process import SimulatedController
     from coneskin.session.session import guard
 
+    assert scene.arm is not None
+    touches: list[float] = []
+    phi, start = _leading_side(scene), [math.radians(q) for q in _FROM_DEG]
     transcript = _Transcript(say, lambda: guarded.began)
-    guarded = guard(scene, recording=folder / "run.rec", on_event=transcript.event, pressed_by=pressed_by)
-    with guarded as session:
+    guarded = guard(scene, recording=folder / "run.rec", on_event=transcript.event)
+    timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(guarded.touch(_TOUCHED_U, phi, duration=0.15)))
+    with SimulatedController("UR5e", scene.arm.host, start), guarded as session:
         transcript.line("the arm moves", after="activated")
-        meanwhile(session)
+        timer.start()
         try:
             session.arm.move_j([math.radians(q) for q in _TO_DEG], _JOINT_SPEED, _JOINT_ACCELERATION)
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
             transcript.line(f"the program gets Collision: {exc}", after="latched")
-
-
-def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> float:
-    """Touch the arm while it moves; return when the touch began [s]."""
-    touches: list[float] = []
-    phi = _leading_side(scene)
-    timers: list[threading.Timer] = []
-
-    def touch_later(session: Session) -> None:
-        timer = threading.Timer(_TOUCH_DELAY, lambda: touches.append(session.touch(_TOUCHED_U, phi, duration=0.15)))
-        timer.start()
-        timers.append(timer)
-
-    try:
-        _collide(scene, folder, say, touch_later)
-    finally:
-        for timer in timers:
+        finally:
             timer.join()
     if not touches:
         raise RobotRefused("the virtual skin was not touched: its process did not answer")

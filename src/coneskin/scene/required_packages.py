@@ -10,7 +10,7 @@ from coneskin.skin.sources.kinds import is_simulated
 if TYPE_CHECKING:
     from .values.scene import Scene
 
-__all__ = ["has_physics_engine", "missing_packages", "required_packages"]
+__all__ = ["missing_packages", "required_packages"]
 
 
 def required_packages(scene: Scene) -> dict[str, str]:
@@ -30,8 +30,3 @@ def required_packages(scene: Scene) -> dict[str, str]:
 def missing_packages(scene: Scene) -> list[str]:
     """Return those that are not installed, all together."""
     return [package for module, package in required_packages(scene).items() if find_spec(module) is None]
-
-
-def has_physics_engine() -> bool:
-    """Tell whether an arm can meet the bodies of a scene here: whether the extra ``physics`` is installed."""
-    return find_spec("mujoco") is not None
