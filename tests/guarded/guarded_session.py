@@ -28,7 +28,8 @@ PATIENT = (
     "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
 )
 #: what a guard says where this computer has held it up in a motion away
-_HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for")
+_HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for", "the time of 2.0 s")
+_TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
 
 
 def scene_text(host, changes=None, control="internal"):
@@ -75,6 +76,8 @@ def until(what, seconds=DEADLINE):
 def until_undisturbed(attempt):
     """Make attempts, each in a fresh session, until one gives something that no hold-up of this computer has ended.
 
+    Skips the test where none does, and far more processes want to run than there are cores.
+
     Args:
         attempt: returns the guard's events.
     """
@@ -84,7 +87,9 @@ def until_undisturbed(attempt):
         said = " ".join(str(event.details) for event in events)
         if not any(words in said for words in _HELD_UP):
             return events
-        assert time.monotonic() < end, "this computer is too busy for any arm to be moved away: " + said
+        if time.monotonic() > end and os.getloadavg()[0] > _TOO_BUSY:
+            pytest.skip("no verdict: this computer is too busy for any arm to be moved away")
+        assert time.monotonic() < end, "no arm is moved away: " + said
 
 
 def is_reset(session):
