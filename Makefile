@@ -8,7 +8,6 @@
 # make check-compiled  the short tests, and all bit-exact replays, on a compiled copy in build/compiled
 VENV ?= .venv
 BIN := $(VENV)/bin
-CORES ?= $(shell nproc 2>/dev/null || echo 2)
 # ur-rtde ships wheels for Python 3.11 and 3.12
 PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
 	$$p -c 'import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' 2>/dev/null && echo $$p && break; done)
@@ -38,16 +37,18 @@ dist: $(VENV)/dev.stamp
 	! command -v cc >/dev/null || CONESKIN_COMPILE=1 $(BIN)/python -m build --wheel
 
 compiled: $(VENV)/dev.stamp
-	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace --parallel $(CORES)
+	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
 
 pure:
 	find -L src \( -name '*.so' -o -name '*.pyd' \) -delete
 
-# a copy of the package with the compiled modules beside their sources
+# what users install, by a quick C compiler: the wheel of the source distribution, and beside it what is in it
 build/compiled/done: setup.py $(shell find -L src/coneskin -name '*.py') | $(VENV)/dev.stamp
 	rm -rf build/compiled
-	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build --build-lib build/compiled --parallel $(CORES)
-	touch $@
+	$(BIN)/python -m build -q --sdist --outdir build/compiled
+	CONESKIN_COMPILE=1 $(BIN)/python -m pip wheel -q --no-deps --no-build-isolation -w build/compiled build/compiled/*.tar.gz
+	$(BIN)/python -m zipfile -e build/compiled/*.whl build/compiled
+	touch build/compiled/*.so build/compiled/coneskin/*/*.so && touch $@
 
 check-compiled: $(VENV)/dev.stamp build/compiled/done
 	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH="$(CURDIR)/build/compiled" scripts/tests "not long"

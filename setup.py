@@ -64,4 +64,5 @@ setup(
     package_dir=package_dir,
     ext_modules=extensions() if compiling and {"build", "build_ext", "bdist_wheel"} & set(sys.argv) else [],
     setup_requires=["mypy>=1.18"] if compiling else [],
+    options={"build_ext": {"parallel": os.cpu_count()}},
 )

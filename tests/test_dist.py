@@ -1,6 +1,7 @@
 """What is built and installed: wheel, source distribution and editable install, each in an environment of its own.
 
-pip fetches the tools and the dependencies of these environments, so these tests need a package index.
+pip fetches the dependencies of these environments, so these tests need a package index. What builds and checks types
+is of the environment of the tests (``[dev]``).
 """
 
 import json
@@ -19,6 +20,7 @@ import coneskin
 from tests.support.paths import COLLISION, ROOT
 
 pytestmark = pytest.mark.long
+pytest.importorskip("build", reason="needs pip install -e '.[dev]'")
 
 FOLDERS = ("geometry", "skin", "robot")
 USER = """\
@@ -35,17 +37,17 @@ Frustum("40", 0.07, 0.15)
 
 
 def run(*command: str | Path, cwd: Path, **variables: str) -> str:
-    words, variables = [str(word) for word in command], {**os.environ, **variables}
+    words, variables = [str(word) for word in command], {**os.environ, "PYTHONPATH": "", **variables}
     done = subprocess.run(words, cwd=cwd, env=variables, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
 def environment(path: Path, *packages: str | Path) -> Path:
-    """Make an empty virtual environment with these packages and return the folder of its programs."""
-    run(sys.executable, "-m", "venv", path, cwd=path.parent)
+    """Make an empty virtual environment with what pip makes of these words; return the folder of its programs."""
+    run(sys.executable, "-m", "venv", "--without-pip", path, cwd=path.parent)
     programs = path / ("Scripts" if sys.platform == "win32" else "bin")
-    run(programs / "python", "-m", "pip", "install", "-q", *packages, cwd=path.parent)
+    run(sys.executable, "-m", "pip", "--python", programs / "python", "install", "-q", *packages, cwd=path.parent)
     return programs
 
 
@@ -65,15 +67,10 @@ def contents(wheel: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def tools(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return environment(tmp_path_factory.mktemp("tools") / "venv", "build")
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory, tools: Path) -> Path:
-    """Folder with the source distribution and the wheel that was built from it."""
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the source distribution and the wheel that was built from it, with what the project says it needs."""
     tree = copy(tmp_path_factory.mktemp("tree") / "coneskin")
-    run(tools / "python", "-m", "build", "-q", cwd=tree)
+    run(sys.executable, "-m", "build", "-q", cwd=tree)
     return tree / "dist"
 
 
@@ -97,7 +94,7 @@ def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
 
 
 @pytest.mark.parametrize("links", [True, False])
-def test_the_tree_and_its_sdist_build_the_same_wheel(wheel: Path, tools: Path, tmp_path: Path, links: bool) -> None:
+def test_the_tree_and_its_sdist_build_the_same_wheel(wheel: Path, tmp_path: Path, links: bool) -> None:
     """With the links of src/coneskin, and with the small files that a git without links makes of them."""
     tree = copy(tmp_path / "coneskin")
     if not links:
@@ -105,7 +102,7 @@ def test_the_tree_and_its_sdist_build_the_same_wheel(wheel: Path, tools: Path, t
             link = tree / "src" / "coneskin" / name
             link.unlink()
             link.write_text(f"../../{name}", encoding="utf-8")
-    run(tools / "python", "-m", "build", "-q", "--wheel", cwd=tree)
+    run(sys.executable, "-m", "build", "-q", "--wheel", "--no-isolation", cwd=tree)
     (other,) = (tree / "dist").glob("*.whl")
     assert contents(other) == contents(wheel)
 
@@ -159,17 +156,21 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-def test_a_compiled_wheel_replays_what_pure_python_has_recorded(tools: Path, built: Path, tmp_path: Path) -> None:
-    """Made from the source distribution, as the workflow does; only faster to translate."""
-    with tarfile.open(next(built.glob("*.tar.gz"))) as archive:
-        archive.extractall(tmp_path, filter="data")
-    (tree,) = tmp_path.iterdir()
-    run(tools / "python", "-m", "build", "-q", "--wheel", cwd=tree, CONESKIN_COMPILE="1", CONESKIN_OPTIMIZE="0")
-    (compiled,) = (tree / "dist").glob("*.whl")
+def test_a_compiled_wheel_replays_what_pure_python_has_recorded(built: Path, installed: Path, tmp_path: Path) -> None:
+    """Made from the source distribution: by ``make build/compiled/done``, or else here."""
+    folder = Path(os.environ.get("COMPILED_WHEEL", tmp_path))
+    if folder == tmp_path:
+        (sdist,) = built.glob("*.tar.gz")
+        words = ("-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", sdist)
+        run(sys.executable, *words, cwd=folder, CONESKIN_COMPILE="1", CONESKIN_OPTIMIZE="0")
+    (compiled,) = folder.glob("*.whl")
     assert "-none-any" not in compiled.name
-    programs = environment(tmp_path / "venv", compiled)
-    assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__} (compiled)\n"
-    assert "the same, bit by bit" in run(programs / "coneskin", "replay", COLLISION, cwd=tmp_path)
+    packages = tmp_path / "packages"
+    run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", packages, compiled, cwd=tmp_path)
+    there = {"cwd": tmp_path, "PYTHONPATH": str(packages)}
+    said = run(installed / "python", "-m", "coneskin", "--version", **there)
+    assert said == f"coneskin {coneskin.__version__} (compiled)\n"
+    assert "the same, bit by bit" in run(installed / "python", "-m", "coneskin", "replay", COLLISION, **there)
 
 
 def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
@@ -177,13 +178,12 @@ def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
     tree = copy(tmp_path / "coneskin")
     if not all((tree / "src" / "coneskin" / name).is_symlink() for name in FOLDERS):
         pytest.skip("this checkout has no symbolic links: git config core.symlinks")
-    programs = environment(tmp_path / "venv", "mypy", "numpy")
-    run(programs / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", tree, cwd=tmp_path)
+    programs = environment(tmp_path / "venv", "--no-deps", "-e", tree)
     project = tmp_path / "project"
     project.mkdir()
     (project / "program.py").write_text(USER, encoding="utf-8")
-    command = [programs / "python", "-m", "mypy", "--strict", "program.py"]
-    done = subprocess.run(command, cwd=project, capture_output=True, text=True, timeout=300)
+    words = ["-m", "mypy", "--strict", "--python-executable", programs / "python", "program.py"]
+    done = subprocess.run([sys.executable, *words], cwd=project, capture_output=True, text=True, timeout=300)
     complaints = [line for line in done.stdout.splitlines() if ": error:" in line]
     assert len(complaints) == 1, done.stdout + done.stderr
     assert complaints[0].startswith("program.py:9: error:")
