@@ -13,7 +13,7 @@ from __future__ import annotations
 from binascii import crc_hqx
 from enum import IntFlag
 from struct import Struct
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 __all__ = [
     "DRIVEN_HEAD",
@@ -162,13 +162,15 @@ def frame_at(data: bytes, offset: int = 0) -> Frame | None:
 
 def _read(layout: _Layout, data: bytes, offset: int) -> Frame:
     """Return the frame of a checked piece."""
-    values = layout.read.unpack_from(data, offset)
+    values: tuple[Any, ...] = layout.read.unpack_from(data, offset)
     if layout is _ONE_SUPPLY:
         supply = values[_SUPPLY_AT]
-        return Frame._make((*values, supply, supply, None))
-    if layout is _THREE_SUPPLIES:
-        return Frame._make((*values, None))
-    return Frame._make((*values[:_DRIVEN_AT], DrivenPotentials._make(values[_DRIVEN_AT:])))
+        values += (supply, supply, None)
+    elif layout is _THREE_SUPPLIES:
+        values += (None,)
+    else:
+        values = (*values[:_DRIVEN_AT], DrivenPotentials._make(values[_DRIVEN_AT:]))
+    return tuple.__new__(Frame, values)  # a third of the time of Frame._make
 
 
 class FrameDecoder:

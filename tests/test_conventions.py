@@ -22,7 +22,7 @@ HOMES = {
     "ContactMatrix": "coneskin.skin.detection.frame.contact_matrix",
     "TouchEvent": "coneskin.skin.detection.events",
     "ArmModel": "coneskin.robot.arm.model",
-    "ControllerState": "coneskin.robot.ur.state_reader",
+    "ControllerState": "coneskin.robot.ur.rtde_codec",
     "kinematics": "coneskin.robot.arm.kinematics",
 }
 

@@ -31,7 +31,7 @@ from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.sim.mock_arm import CompanionProcesses
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.sensor import Sensor
@@ -113,7 +113,7 @@ class Day:
             self._speed = SPEED
         self._q[0] = (self._q[0] + 0.002 * self._speed + 3.0) % 6.0 - 3.0
         state = (now, tuple(self._q), (self._speed, 0.0, 0.0, 0.0, 0.0, 0.0), 7, 1, 2, (0.0,) * 6, (0.0,) * 6)
-        block = Block(BlockKind.ARM, now, RECIPE.pack(state))
+        block = Block(BlockKind.ARM, now, STATE_RECIPE.pack(state))
         self.core.feed(block, self._out)
         self.recorded += len(encode_block(block))
 

@@ -12,7 +12,7 @@ import tempfile
 import time
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -96,7 +96,8 @@ def write_frames(rate_hz: float, master: int, states: int, stamps: int) -> None:
                 os.write(master, data)
                 if number % 2 == 0:
                     os.write(
-                        states, RECIPE.pack((due, STANDING_JOINTS, ZERO_JOINTS, 7, 1, 2, ZERO_JOINTS, ZERO_JOINTS))
+                        states,
+                        STATE_RECIPE.pack((due, STANDING_JOINTS, ZERO_JOINTS, 7, 1, 2, ZERO_JOINTS, ZERO_JOINTS)),
                     )
         except OSError:
             return

@@ -24,7 +24,7 @@ from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.timing import TimingLimits
 from coneskin.skin.detection.stream import TouchStream
@@ -51,7 +51,7 @@ class States:
     def read(self) -> list[bytes]:
         """Return the payloads that have come."""
         data = self._sock.recv(1 << 16)
-        return [data[at : at + RECIPE.size] for at in range(0, len(data), RECIPE.size)]
+        return [data[at : at + STATE_RECIPE.size] for at in range(0, len(data), STATE_RECIPE.size)]
 
 
 @dataclass

@@ -11,7 +11,7 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent, Output
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.build import build_core
 from coneskin.scene.reader import parse_scene
@@ -54,7 +54,7 @@ def record_long_run(path: Path, model: Path, seconds: float) -> None:
                 q = [-0.7, -1.6, 1.6, -1.6, -1.6, 0.2 * math.sin(due)]
                 qd = [swing, 0.0, 0.0, 0.0, 0.0, 0.2 * math.cos(due) if swing else 0.0]
                 values = [[x + noise.gauss(0.0, 1e-5) for x in row] for row in (q, qd, [1.0] * 6, [1.0] * 6)]
-                state = RECIPE.pack([due, values[0], values[1], 7, 1, 2, values[2], values[3]])
+                state = STATE_RECIPE.pack([due, values[0], values[1], 7, 1, 2, values[2], values[3]])
                 take(BlockKind.ARM, _START_TIME + due, state)
                 due += 0.002
             take(BlockKind.SKIN, _START_TIME + time, data)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ArmModel
@@ -41,7 +41,7 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
 
 __all__ = ["ArmSupervisor"]
 
-_OFFSET_WINDOW = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
+_OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
 
 
 class _ControllerClock:
@@ -78,8 +78,8 @@ class _ControllerClock:
         return min(controller + smallest, host)
 
 
-_MAX_SUPERVISION_LAG = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
-_LAG_TIME = 0.02  # s for which they must be as late
+_MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
+_LAG_TIME: Final = 0.02  # s for which they must be as late
 
 
 class _StateAge:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CompanionMonitor"]
 
-_MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
+_MIN_STALL: Final = 0.02  # s between two looks, from which on the guard itself was held up
 
 
 class _HeartbeatMonitor:
@@ -65,7 +65,7 @@ class _HeartbeatMonitor:
 
 
 _USER_PROGRAM = "the program that guards"
-_RESTART_TIMEOUT = 5.0  # s for the driver's program to run again after an announced end
+_RESTART_TIMEOUT: Final = 5.0  # s for the driver's program to run again after an announced end
 #: process that can be lost -> the stop path that goes with it; the driver knows those of its connections
 _LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
     "driver": frozenset({StopPath.DRIVER}),

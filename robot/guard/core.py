@@ -20,6 +20,7 @@ from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.skin.detection.detector import TouchAlarm
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
 from coneskin.skin.detection.stream import TouchStream
 
@@ -144,6 +145,8 @@ class GuardCore:
         self._reopened = False  # the skin's port, and the guard has not been active since
         self._contacts: dict[str, Contact] = {}  # by sensor
         self._newest_number = 0
+        self._out: Outputs | None = None  # that the alarm puts a stop into
+        self._alarm: TouchAlarm | None = None
         self._extended = 0  # number of the newest touch that was reported as not one disc
         self._located: set[str] = set()  # sensors whose touch had a certain place in its newest event
         self._feeders: dict[int, Callable[[Block, Outputs], None]] = {
@@ -208,8 +211,10 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
+        if out is not self._out:  # the same one with every input
+            self._out, self._alarm = out, partial(self._stop, out)
         guarded = self._arm is not None and self._arm.phase is Phase.ACTIVE
-        for event in self._stream.feed(block.payload, block.time, partial(self._stop, out) if guarded else None):
+        for event in self._stream.feed(block.payload, block.time, self._alarm if guarded else None):
             self._feed_event(event, out)
         if self._contacts:
             self._update_contacts(block.time, out)

@@ -21,13 +21,9 @@ class Phase(Enum):
     @property
     def watched(self) -> bool:
         """True where a fault has to stop the arm now."""
-        return self in _WATCHED_PHASES
+        return self is Phase.ACTIVE or self is Phase.SLOWED or self is Phase.RETREATING
 
     @property
     def stopping(self) -> bool:
         """True while a stop is under way."""
-        return self in _STOPPING_PHASES
-
-
-_WATCHED_PHASES = frozenset({Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING})
-_STOPPING_PHASES = frozenset({Phase.STOPPING, Phase.HALTING})
+        return self is Phase.STOPPING or self is Phase.HALTING

@@ -7,8 +7,7 @@ from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StatusReport, StopProgram
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
-from coneskin.robot.ur.rtde_codec import Recipe
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE, Recipe
 
 __all__ = ["SLIDER", "CompanionProcesses", "MockArm"]
 
@@ -96,7 +95,7 @@ class MockArm:
     def packet(self, q: Sequence[float], qd: Sequence[float], current: Sequence[float]) -> bytes:
         """Return the payload of an RTDE packet with these positions [rad], speeds [rad/s] and currents [A] measured."""
         modes = self.robot_mode, self.safety_bits, self.runtime_state
-        return RECIPE.pack((self.clock, tuple(q), tuple(qd), *modes, tuple(current), (0.0,) * 6))
+        return STATE_RECIPE.pack((self.clock, tuple(q), tuple(qd), *modes, tuple(current), (0.0,) * 6))
 
 
 _REPORT_PERIOD = 0.02  # s between two heartbeats

@@ -13,7 +13,8 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.protocol import ArmDriver, ExaminationScope
 from coneskin.robot.driver.values import StopPath
 
-from .state_reader import StateReader, decode_state
+from .rtde_codec import decode_state
+from .state_reader import StateReader
 from .stop_sockets import StopSockets
 
 if TYPE_CHECKING:

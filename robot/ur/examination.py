@@ -21,8 +21,9 @@ from coneskin.robot.driver.protocol import ExaminationScope
 
 from .input_writers import HEARTBEAT_INPUTS, SETPOINT_INPUTS, SLIDER_INPUTS
 from .model_check import check_model, read_pose
+from .rtde_codec import decode_state
 from .rtde_connection import PORT, RtdeConnection
-from .state_reader import StateReader, decode_state
+from .state_reader import StateReader
 
 __all__ = ["examine"]
 

@@ -9,25 +9,29 @@ by its own table of names and so only understands the true ones.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
+from coneskin.robot.driver.values import ControllerState
 
 __all__ = [
     "HEADER",
     "IN_USE",
     "NOT_FOUND",
     "PROTOCOL_VERSION",
+    "STATE_RECIPE",
     "VARIABLES",
     "Packet",
     "PacketKind",
     "Recipe",
     "Value",
+    "decode_state",
     "pack",
     "pack_inputs_request",
     "pack_outputs_request",
@@ -307,3 +311,42 @@ def unpack_types(payload: bytes, names: Sequence[str]) -> Recipe:
     if wrong:
         raise RobotRefused("the controller refuses RTDE variables: " + "; ".join(wrong))
     return Recipe(names, payload[0])
+
+
+_STATE_NAMES = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
+_CURRENT_NAMES = ("actual_current", "target_current")
+#: the variables that the state reader asks for
+STATE_RECIPE: Final = Recipe((*_STATE_NAMES, *_CURRENT_NAMES))
+_WITHOUT_CURRENTS: Final = Recipe(_STATE_NAMES)  # of recordings made before the reader asked for them
+#: bits 2 to 10: protective, recovery, safeguard, emergency, violation, fault, stopped
+_SAFETY_STOPS: Final = 0b11111111100
+_PROGRAM_RUNNING: Final = 2  # value of runtime_state
+_ARM_RUNNING: Final = 7  # value of robot_mode: powered, brakes released
+
+
+def decode_state(time: float, payload: bytes) -> ControllerState:
+    """Return the state in the payload of an RTDE data packet of the state reader's recipe.
+
+    Args:
+        time: host time [s].
+        payload: recipe id and values.
+
+    Raises:
+        RobotConnectionError: the payload has another length, or its time, a position, a speed or a current is not
+            finite.
+    """
+    recipe = _WITHOUT_CURRENTS if len(payload) == _WITHOUT_CURRENTS.size else STATE_RECIPE
+    values = recipe.unpack_flat(payload)
+    controller_time, q, qd, currents = values[0], values[1:7], values[7:13], values[16:]
+    if not math.isfinite(sum(values)):  # most are, and one sum tells
+        if not math.isfinite(controller_time + sum(q) + sum(qd)):
+            raise RobotConnectionError(
+                f"its time, joint positions or speeds are not finite: {controller_time} s, {q} rad, {qd} rad/s"
+            )
+        if not math.isfinite(sum(currents)):
+            raise RobotConnectionError(f"its motor currents are not finite: {currents} A")
+    powered, running = values[13] == _ARM_RUNNING, values[15] == _PROGRAM_RUNNING
+    stopped = values[14] & _SAFETY_STOPS != 0
+    current, target = (currents[:6], currents[6:]) if currents else (None, None)
+    fields = time, controller_time, q, qd, powered, stopped, running, current, target
+    return tuple.__new__(ControllerState, fields)  # quicker than ControllerState()

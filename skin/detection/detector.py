@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Final
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
@@ -33,7 +34,7 @@ __all__ = ["Detector", "TouchAlarm"]
 #: called with the sensor's name and the level as soon as a touch is certain, before its place is worked out
 TouchAlarm = Callable[[str, float], None]
 
-_RESTARTED_BIT = int(Status.RESTARTED)
+_RESTARTED_BIT: Final = int(Status.RESTARTED)
 #: Faults that a contact produces when it changes between the phases of one frame; over the seam it looks like a short.
 _CONTACT_FAULTS = frozenset(
     {
@@ -41,8 +42,8 @@ _CONTACT_FAULTS = frozenset(
         *(Fault.SHORT_UPPER, Fault.SHORT_LOWER),
     }
 )
-_MAX_CONTRADICTIONS = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
-_CONTRADICTION_DECAY = 0.1  # frames; each good frame takes so many off the count
+_MAX_CONTRADICTIONS: Final = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
+_CONTRADICTION_DECAY: Final = 0.1  # frames; each good frame takes so many off the count
 
 
 class _StuckValues:
@@ -54,22 +55,25 @@ class _StuckValues:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._last: tuple[int, ...] = (-1, -1, -1, -1, -1)
-        self._still = [0, 0, 0, 0, 0]
+        self._last: Frame | None = None
+        self._still = (0, 0, 0, 0, 0)
 
     def feed(self, frame: Frame) -> bool:
         """Take a frame. Tell whether one of its values is stuck."""
         if not self._most:
             return False
-        counts = (
-            *(frame.radial_current, frame.angular_current),
-            *(frame.touch_supply, frame.radial_supply, frame.angular_supply),
+        last, self._last = self._last, frame
+        if last is None:
+            return False
+        a, b, c, d, e = self._still
+        self._still = a, b, c, d, e = (
+            a + 1 if frame.radial_current == last.radial_current else 0,
+            b + 1 if frame.angular_current == last.angular_current else 0,
+            c + 1 if frame.touch_supply == last.touch_supply else 0,
+            d + 1 if frame.radial_supply == last.radial_supply else 0,
+            e + 1 if frame.angular_supply == last.angular_supply else 0,
         )
-        still, last = self._still, self._last
-        for k in (0, 1, 2, 3, 4):
-            still[k] = still[k] + 1 if counts[k] == last[k] else 0
-        self._last = counts
-        return max(still) >= self._most
+        return a >= (most := self._most) or b >= most or c >= most or d >= most or e >= most
 
 
 class Detector:

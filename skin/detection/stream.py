@@ -7,6 +7,7 @@ frames, are counted, and reported once each.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
@@ -19,8 +20,8 @@ from .frame.settings import DetectorSettings
 
 __all__ = ["TouchStream"]
 
-_MAX_BAD_BYTES = 4 * FRAME_LENGTH  # bytes; more of them outside any frame are a corrupt stream
-_BAD_BYTES_DECAY = 1  # byte; each good frame takes so many off the count
+_MAX_BAD_BYTES: Final = 4 * FRAME_LENGTH  # bytes; more of them outside any frame are a corrupt stream
+_BAD_BYTES_DECAY: Final = 1  # byte; each good frame takes so many off the count
 
 
 class TouchStream:
@@ -44,7 +45,7 @@ class TouchStream:
             raise SensorError("a stream needs at least one sensor, got none")
         self.decoder = FrameDecoder()
         self.detectors = tuple(Detector(sensor, settings) for sensor in sensors)
-        self._by_number = {(d.sensor.device_id, d.sensor.sensor_id): d for d in self.detectors}
+        self._by_number = {d.sensor.device_id << 8 | d.sensor.sensor_id: d for d in self.detectors}
         names = {d.sensor.name for d in self.detectors}
         if len(self._by_number) < len(self.detectors) or len(names) < len(self.detectors):
             listing = ", ".join(f"{s.name} = {s.device_id}/{s.sensor_id}" for s in sensors)
@@ -77,7 +78,7 @@ class TouchStream:
         events: list[SkinEvent] = []
         frames = self.decoder.feed(data)
         for frame in frames:
-            detector = self._by_number.get((frame.device, frame.sensor))
+            detector = self._by_number.get(frame.device << 8 | frame.sensor)
             if detector is not None:
                 happened = detector.feed(frame, now, alarm)
                 if happened:

@@ -18,14 +18,14 @@ the noise of their currents.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, Frame
 
 __all__ = ["ContactMatrix", "FrameInversion", "FrameNoise", "MatrixNoise"]
 
-_MIN_CONDUCTANCE = 1e-9  # S; a conductance below this is none
+_MIN_CONDUCTANCE: Final = 1e-9  # S; a conductance below this is none
 
 
 class ContactMatrix(NamedTuple):

@@ -7,8 +7,7 @@ current must be what flows through the two pull-downs (Kirchhoff). That proves b
 
 from __future__ import annotations
 
-from operator import itemgetter
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
@@ -37,22 +36,12 @@ class TouchReading(NamedTuple):
     velocity: tuple[float, float] = (0.0, 0.0)  #: along the side and around [m/s]
 
 
-#: Fields of a frame that a reading is made of, in the order in which `read` and `_fault` take them.
-_READING_FIELDS = (
-    *("status", "touch_supply", "radial_supply", "angular_supply"),
-    *("touch_c", "touch_d", "touch_current"),
-    *("radial_c", "radial_d", "radial_current"),
-    *("angular_a", "angular_b", "angular_current"),
-)
-_pick_fields = itemgetter(
-    *(Frame._fields.index(name) for name in _READING_FIELDS)
-)  # as fast as unpacking the whole frame
-_STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
-_LEVEL_NOISE = 1.5  # counts; noise of the level in the bound on what a leak between the layers puts on a guide
-_GUIDE_SLACK = 0.05  # part of the supply that a guide may stand above that bound
-_NOISE_DEVIATIONS = 7.0  # standard deviations of noise that are no contradiction
-_DRIVE_LOSS = 0.03  # part of the supply that a driven electrode may lose beyond what its lead is told to
-_RECIPROCITY_ERROR = 0.5  # part of the larger side; beyond it two guides contradict each other
+_STATUS_FAULTS: Final = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
+_LEVEL_NOISE: Final = 1.5  # counts; noise of the level in the bound on what a leak between the layers puts on a guide
+_GUIDE_SLACK: Final = 0.05  # part of the supply that a guide may stand above that bound
+_NOISE_DEVIATIONS: Final = 7.0  # standard deviations of noise that are no contradiction
+_DRIVE_LOSS: Final = 0.03  # part of the supply that a driven electrode may lose beyond what its lead is told to
+_RECIPROCITY_ERROR: Final = 0.5  # part of the larger side; beyond it two guides contradict each other
 
 
 class Reading(NamedTuple):
@@ -90,19 +79,19 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
     Returns:
         the reading. A frame that cannot be believed has ``fault`` set, and then its other values are a guess.
     """
-    values, sequence, clock_us = _pick_fields(frame), frame.sequence, frame.clock_us
-    status, supply, supply1, supply2, touch_c, touch_d, _, radial_c, radial_d, _, angular_a, angular_b, _ = values
+    sequence, clock_us = frame.sequence, frame.clock_us
+    supply, supply1, supply2 = frame.touch_supply, frame.radial_supply, frame.angular_supply
     bounds, limits = sensor.bounds, sensor.thresholds
     low, high = bounds.supply_low, bounds.supply_high
     if not (low <= supply <= high and low <= supply1 <= high and low <= supply2 <= high):
-        worst = Fault.DEVICE if status & _STATUS_FAULTS else Fault.SUPPLY
+        worst = Fault.DEVICE if frame.status & _STATUS_FAULTS else Fault.SUPPLY
         return Reading(sensor, sequence, clock_us, 0.0, None, False, worst)
-    level = (touch_c + touch_d) / (2.0 * supply)
-    fault = _fault(sensor, values, level, noise)
+    level = (frame.touch_c + frame.touch_d) / (2.0 * supply)
+    fault = _fault(sensor, frame, level, noise)
     if fault is None and frame.driven is not None and _loses_drive(sensor, frame):
         fault = Fault.LEAD
     if level < limits.release_level:
-        return Reading(sensor, sequence, clock_us, level, None, False, fault)
+        return tuple.__new__(Reading, (sensor, sequence, clock_us, level, None, False, fault))  # quicker than Reading()
     matrix = (inversion or FrameInversion(sensor)).invert(frame[6:18])
     if matrix is None:
         return Reading(sensor, sequence, clock_us, level, None, False, fault)
@@ -112,16 +101,17 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
     if firm and not inside and fault is None:
         fault = Fault.OUT_OF_RANGE
     spread1, spread2 = limits.guide_spread * supply1, limits.guide_spread * supply2
-    split = -spread1 <= radial_c - radial_d <= spread1 and -spread2 <= angular_a - angular_b <= spread2
+    split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
+    split = -spread1 <= split1 <= spread1 and -spread2 <= split2 <= spread2
     return Reading(sensor, sequence, clock_us, level, matrix, firm and inside and split and fault is None, fault)
 
 
-def _fault(sensor: Sensor, values: tuple[int, ...], level: float, noise: float) -> Fault | None:
+def _fault(sensor: Sensor, frame: Frame, level: float, noise: float) -> Fault | None:
     """Return the first thing that is wrong with a frame whose supply is right, or None."""
-    status, supply, supply1, supply2, touch_c, touch_d, current0, radial_c, radial_d, current1, *rest = values
-    angular_a, angular_b, current2 = rest
+    touch_c, touch_d, current0, radial_c, radial_d, current1, angular_a, angular_b, current2 = frame[6:15]
+    supply, supply1, supply2 = frame.touch_supply, frame.radial_supply, frame.angular_supply
     bounds, limits = sensor.bounds, sensor.thresholds
-    if status & _STATUS_FAULTS:
+    if frame.status & _STATUS_FAULTS:
         return Fault.DEVICE
     touched = level >= limits.touch_level
     lower_is_less = current2 * bounds.radial_low < current1 * bounds.angular_low  # a wire fed from elsewhere takes both

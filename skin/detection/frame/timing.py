@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from coneskin.core.errors import SensorError
 
@@ -15,9 +16,11 @@ from .faults import Fault
 
 __all__ = ["FrameTiming", "TimingLimits"]
 
-_LEARNING_FRAMES = 16  # frames; from then on the period is known well enough to judge by
-_BACKLOG_TIME = 0.25  # s; in it what had piled up before the port was opened has been read, and looks like a fast clock
-_RESTART_FRAMES = 32  # frames; so many old ones in a row mean that the device has started anew
+_LEARNING_FRAMES: Final = 16  # frames; from then on the period is known well enough to judge by
+_BACKLOG_TIME: Final = (
+    0.25  # s; in it what had piled up before the port was opened is read, and looks like a fast clock
+)
+_RESTART_FRAMES: Final = 32  # frames; so many old ones in a row mean that the device has started anew
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ compared with what is left, so that no press is lost by it, however slowly it co
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
@@ -25,16 +26,18 @@ from .settings import DetectorSettings
 
 __all__ = ["UntouchedCurrents", "UntouchedGuides", "UntouchedLeak", "UntouchedLevel"]
 
-CURRENT_BLOCK = 32  # frames that are averaged at once; noise that lasts as long, as mains hum does, shows in the means
-_CURRENT_MEMORY = 64  # blocks that the mean remembers
-_FREE_BLOCKS = 8  # blocks in which it is found; from then on its drift is bounded
-_PRIOR_BLOCKS = 16  # blocks that the noise taken from the start counts for
-_PRIOR_NOISE = 0.7  # counts; standard deviation that is assumed at the start
-_ROUNDING_VARIANCE = 1.0 / 12.0  # counts^2; variance of rounding alone
-_CURRENT_JUMP = 0.01  # ratio; an untouched current that is off by this has changed
-_JUMP_DEVIATIONS = 8.0
-_THRESHOLD_DEVIATIONS = 7.0  # standard deviations between a threshold and what noise reaches: once in 1e11 frames
-_MAX_GUIDE_THRESHOLD = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
+CURRENT_BLOCK: Final = (
+    32  # frames that are averaged at once; noise that lasts as long, as mains hum, shows in the means
+)
+_CURRENT_MEMORY: Final = 64  # blocks that the mean remembers
+_FREE_BLOCKS: Final = 8  # blocks in which it is found; from then on its drift is bounded
+_PRIOR_BLOCKS: Final = 16  # blocks that the noise taken from the start counts for
+_PRIOR_NOISE: Final = 0.7  # counts; standard deviation that is assumed at the start
+_ROUNDING_VARIANCE: Final = 1.0 / 12.0  # counts^2; variance of rounding alone
+_CURRENT_JUMP: Final = 0.01  # ratio; an untouched current that is off by this has changed
+_JUMP_DEVIATIONS: Final = 8.0
+_THRESHOLD_DEVIATIONS: Final = 7.0  # standard deviations from what noise reaches to a threshold: once in 1e11 frames
+_MAX_GUIDE_THRESHOLD: Final = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
 
 
 class UntouchedCurrents:
@@ -135,11 +138,13 @@ def bounded(step: float, most: float) -> float:
     return most if step > most else -most if step < -most else step
 
 
-_GUIDE_JUMP = 0.01  # part of the supply; a sudden potential of a guide, or a difference of two, that nothing explains
-_MAX_JUMP = 0.03  # part of the supply; what noise raises that to at most
-_GUIDE_DEVIATIONS = 7.0  # standard deviations of noise that are no potential
-_MAX_GUIDE_GROWTH = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
-_LEVEL_COUNTS = 1.5  # counts; a change of the level by this explains what the guides show
+_GUIDE_JUMP: Final = (
+    0.01  # part of the supply; sudden potential of a guide, or difference of two, that nothing explains
+)
+_MAX_JUMP: Final = 0.03  # part of the supply; what noise raises that to at most
+_GUIDE_DEVIATIONS: Final = 7.0  # standard deviations of noise that are no potential
+_MAX_GUIDE_GROWTH: Final = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's
+_LEVEL_COUNTS: Final = 1.5  # counts; a change of the level by this explains what the guides show
 
 
 class UntouchedGuides:
@@ -194,11 +199,11 @@ class UntouchedGuides:
         return step1 > step or step2 > step or abs(split1) > split or abs(split2) > split
 
 
-LEAK_BLOCK = 32  # frames that are averaged before they are inverted
-_LEAK_MEMORY = 16  # blocks that the mean remembers
-_MIN_LEAK_LEVEL = 1e-3  # a leak that shows less does nothing to a touch: 5 Mohm with 10 kohm pull-downs
-_MIN_LEAK = 1e-7  # S; 10 Mohm are what the converter's own inputs are
-_MAX_LEAK_SHARE = 0.5  # of the whole conductance; where the leak is more, a touch is too weak for a place
+LEAK_BLOCK: Final = 32  # frames that are averaged before they are inverted
+_LEAK_MEMORY: Final = 16  # blocks that the mean remembers
+_MIN_LEAK_LEVEL: Final = 1e-3  # a leak that shows less does nothing to a touch: 5 Mohm with 10 kohm pull-downs
+_MIN_LEAK: Final = 1e-7  # S; 10 Mohm are what the converter's own inputs are
+_MAX_LEAK_SHARE: Final = 0.5  # of the whole conductance; where the leak is more, a touch is too weak for a place
 
 
 class UntouchedLeak:

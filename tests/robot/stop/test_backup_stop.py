@@ -8,7 +8,7 @@ from coneskin.robot.stop import backup_stop as module
 from coneskin.robot.stop.backup_stop import BackupStop, StandstillHold
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
-from coneskin.robot.ur.state_reader import RECIPE
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 
 Q = (0.0, -1.6, 1.6, -1.6, -1.6, 0.0)
 
@@ -64,7 +64,7 @@ class World:
             return []
         self.told = self.now
         qd = (self.speed, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return [RECIPE.pack([self.now, Q, qd, 7, self.safety, 2 if self.playing else 1, (0.0,) * 6, (0.0,) * 6])]
+        return [STATE_RECIPE.pack([self.now, Q, qd, 7, self.safety, 2 if self.playing else 1, (0.0,) * 6, (0.0,) * 6])]
 
     def close(self):
         self.closed += 1

@@ -12,7 +12,8 @@ from coneskin.robot.sim.machine.states import SafetyMode
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur import rtde_codec, rtde_connection
 from coneskin.robot.ur.program_io import _SAFETY_MODES
-from coneskin.robot.ur.state_reader import RECIPE, StateReader, decode_state
+from coneskin.robot.ur.rtde_codec import STATE_RECIPE, decode_state
+from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.support.served_controller import served
 
@@ -58,16 +59,16 @@ def test_a_current_that_cannot_be_is_refused(controller, line):
 
 def test_a_state_without_currents_has_none_and_one_with_nonsense_is_refused():
     modes = (0.0, ZEROS, ZEROS, 7, 1, 2)
-    old = RECIPE.pack((*modes, ZEROS, ZEROS))[: -2 * 6 * 8]
+    old = STATE_RECIPE.pack((*modes, ZEROS, ZEROS))[: -2 * 6 * 8]
     assert decode_state(0.0, old).current is None
     with pytest.raises(RobotConnectionError, match="motor currents are not finite"):
-        decode_state(0.0, RECIPE.pack((*modes, (math.nan,) * 6, ZEROS)))
+        decode_state(0.0, STATE_RECIPE.pack((*modes, (math.nan,) * 6, ZEROS)))
 
 
 def test_safety_bits_and_modes_mean_what_the_manual_says():
     def state(mode=7, bits=1, runtime=2):
         qd = (0.0, -3.0, 2.0, 0.0, 0.0, 0.0)
-        return decode_state(0.0, RECIPE.pack((0.0, ZEROS, qd, mode, bits, runtime, ZEROS, ZEROS)))
+        return decode_state(0.0, STATE_RECIPE.pack((0.0, ZEROS, qd, mode, bits, runtime, ZEROS, ZEROS)))
 
     assert state().speed == 3
     assert not state(bits=0b11).stopped_by_safety  # normal and reduced

@@ -14,6 +14,7 @@ from .block import MAX_PAYLOAD, Block, is_time
 __all__ = [
     "CHUNK_HEAD_SIZE",
     "FILE_HEAD_SIZE",
+    "LAST_BIT",
     "MAGIC",
     "MAX_BODY",
     "SYNC",
@@ -36,7 +37,7 @@ CHUNK_HEAD_SIZE = _CHUNK_HEAD.size  #: bytes
 MAX_BODY = 2 * MAX_PAYLOAD  #: bytes of a chunk's blocks before compression; more is damage, not data
 _PLAIN, _ZLIB = 0, 1  # encodings of a body
 _ZLIB_LEVEL = 1  # of zlib: 3.1 times smaller in 2 to 4 ms for a second of an arm and a skin; 6 gains 8 % more
-_LAST_BIT = 63  # of ``ChunkHead.kinds``: this kind or one above it
+LAST_BIT = 63  #: of ``ChunkHead.kinds``: this kind or one above it
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,7 @@ def bits(kinds: Sequence[int] | frozenset[int]) -> int:
     """Return kinds of block as the bits of ``ChunkHead.kinds``."""
     found = 0
     for kind in kinds:
-        found |= 1 << min(kind, _LAST_BIT)
+        found |= 1 << min(kind, LAST_BIT)
     return found
 
 
@@ -132,16 +133,17 @@ def decode_body(head: ChunkHead, stored: bytes) -> list[Block]:
     at, size, since, until = 0, len(body), head.since, head.until
     unpack, skip, make = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size, tuple.__new__
     blocks: list[Block] = []
+    put, longest = blocks.append, MAX_PAYLOAD
     try:
         while at < size:
             length, kind, time = unpack(body, at)
-            at += skip
-            if at + length > size or length > MAX_PAYLOAD:
+            start = at + skip
+            at = start + length
+            if at > size or length > longest:
                 raise _wrong(head, f"a block has {length} bytes")
             if not since <= time <= until:
                 raise _wrong(head, f"a block of it has the time {time} s")
-            blocks.append(make(Block, (kind, time, body[at : at + length])))  # half the time of Block(...)
-            at += length
+            put(make(Block, (kind, time, body[start:at])))  # half the time of Block(...)
     except struct.error:
         raise _wrong(head, f"{size - at} bytes are left behind its last block") from None
     return blocks

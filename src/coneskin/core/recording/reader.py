@@ -15,7 +15,7 @@ from coneskin.core.files import open_file
 from coneskin.core.progress import Progress, silent
 
 from .block import ALL_KINDS, COPY, DROPPED, FILE_KINDS, Block, decode_copy
-from .chunk import FILE_HEAD_SIZE, MAGIC, bits, decode_body, decode_file_head
+from .chunk import FILE_HEAD_SIZE, LAST_BIT, MAGIC, bits, decode_body, decode_file_head
 from .defects import Defect, decode_drop, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, walk
 
@@ -69,11 +69,22 @@ class Recording:
         Raises:
             RecordingError: a file has changed since it was opened, or cannot be read.
         """
+        for blocks in self.batches(since, until, kinds):
+            yield from blocks
+
+    def batches(
+        self, since: float = -math.inf, until: float = math.inf, kinds: frozenset[int] = ALL_KINDS
+    ) -> Iterator[list[Block]]:
+        """Yield the blocks of ``select``, those of a chunk together: quicker than one by one."""
         shown = kinds - self.hidden
-        for chunk in self._chunks(since, until, bits(shown)):
-            for block in decode_body(chunk.head, chunk.stored):
-                if block.kind in shown and since <= block.time <= until:
-                    yield block
+        mask = bits(shown)
+        unlike = ~bits([kind for kind in shown if kind < LAST_BIT])  # a chunk of such a kind shows a part of it
+        for chunk in self._chunks(since, until, mask):
+            head, blocks = chunk.head, decode_body(chunk.head, chunk.stored)
+            if head.kinds & unlike or head.since < since or head.until > until:
+                blocks = [block for block in blocks if block.kind in shown and since <= block.time <= until]
+            if blocks:
+                yield blocks
 
     def _chunks(self, since: float, until: float, kinds: int) -> Iterator[Chunk]:
         """Yield the intact chunks with blocks in a time [s, host clock] and of kinds, each once, in order."""

@@ -197,11 +197,12 @@ class Run:
         begin = self.blocks.since
         duration = max(self.blocks.until - begin, _PROGRESS_PERIOD)
         due = math.inf if progress is silent else begin + _PROGRESS_PERIOD
-        for block in self.blocks.select(since, until, kinds):
-            if block.time >= due:
-                due = block.time + _PROGRESS_PERIOD
-                progress(min((block.time - begin) / duration, 1.0))
-            yield block
+        for blocks in self.blocks.batches(since, until, kinds):
+            time = blocks[0].time
+            if time >= due:
+                due = time + _PROGRESS_PERIOD
+                progress(min((time - begin) / duration, 1.0))
+            yield from blocks
         progress(1.0)
 
     def frames(self, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
@@ -366,11 +367,11 @@ class Run:
             RecordingError: a block holds what no guard records.
         """
         events: list[GuardEvent] = []
-        frames = 0
+        frames, skin = 0, int(BlockKind.SKIN)
         for block, outputs in self.decide(self.build_core(scene), progress):
             if outputs:
                 events += [output for output in outputs if isinstance(output, GuardEvent)]
-            if block.kind == BlockKind.SKIN:
+            if block.kind == skin:
                 frames += len(block.payload)
         gap, recorded = self.gap, self.events
         then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
