@@ -50,6 +50,20 @@ def test_a_busy_port_says_so():
 
 
 @posix
+def test_bytes_that_a_line_does_not_take_are_told():
+    from coneskin.skin.virtual.pseudo_terminal import write_all
+
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    assert write_all(write, bytes(1000))
+    while write_all(write, bytes(65536)):
+        pass
+    assert len(os.read(read, 1000)) == 1000
+    os.close(read)
+    os.close(write)
+
+
+@posix
 def test_a_file_is_no_port():
     with pytest.raises(SkinConnectionError, match=r"^/dev/null: cannot be opened"):
         SerialPort("/dev/null").open()
