@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
+from coneskin.commands.replay import _exit_code
 from tests.support.paths import COLLISION
 
 
@@ -58,6 +59,22 @@ def test_a_folder_of_runs_is_listed_and_several_runs_are_summed_up(
     out = capsys.readouterr().out
     assert "b/run.rec: BROKEN: " in out
     assert "\n1 of 2 runs replayed the same as recorded\n" in out
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"same": True}, 0),
+        ({"first_difference": "contact"}, 1),
+        ({"diverged_s": 0.5}, 1),
+        ({"complete": True}, 1),
+        ({}, 4),
+        ({"error": "broken"}, 1),
+    ],
+)
+def test_a_run_that_only_lacks_something_is_told_from_one_that_differs(changes: dict[str, object], code: int) -> None:
+    row = {"error": "", "same": False, "first_difference": "", "diverged_s": None, "complete": False, **changes}
+    assert _exit_code([row], compared=True, incomplete_too=False) == code
 
 
 def test_a_variant_that_cannot_be_is_named_with_its_reason(capsys: pytest.CaptureFixture[str]) -> None:

@@ -47,6 +47,12 @@ def test_shapes_broadcast() -> None:
     assert CONE.locate_all(points)[0].shape == (5, 7)
 
 
+def test_a_side_that_is_turned_has_its_seam_at_that_azimuth() -> None:
+    turned = TUBE.turned(0.4)
+    assert turned.point(0.03, 0.0) == pytest.approx(TUBE.point(0.03, 0.4), abs=1e-15)
+    assert turned.point(0.2, 1.0) == pytest.approx(TUBE.point(0.2, 1.4), abs=1e-15)
+
+
 def test_double_cone_shares_its_belt() -> None:
     body = Pose.from_xyz_rpy((0.1, 0.2, 0.3), (0.4, -0.5, 0.6))
     first, second = (part.moved(body) for part in double_cone(0.04, 0.07, 0.05, 0.15, 0.12))

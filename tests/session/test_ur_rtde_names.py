@@ -4,11 +4,13 @@ import ast
 import importlib.util
 import inspect
 import re
+from unittest.mock import Mock, call
 
 import pytest
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.models import arm_model
+from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.ur.ur_rtde import _QUESTION_WORDS
 from coneskin.session import ur_rtde_names
 from coneskin.session.ur_rtde_names import NAMES, REFUSALS, UrRtdeArm
@@ -80,3 +82,20 @@ def test_what_a_method_is_called_here_exists(arm) -> None:
         for word in re.findall(r"^(\w+)|, (\w+)", method.own):
             own = word[0] or word[1]
             assert own == "time" or own in dir(UrRtdeArm), method
+
+
+@pytest.mark.parametrize(("name", "own"), [("moveJ", "move_j"), ("moveL", "move_l")])
+def test_a_list_of_lists_is_a_path_and_a_move_waits_unless_it_is_told_not_to(name, own) -> None:
+    arm, point, make = Mock(), [0.1] * 6, getattr(Waypoint, own)
+    method = NAMES[name].call
+    method(arm, point, 0.5, 2.0)
+    method(arm, point, 0.5, 2.0, True)
+    method(arm, [[*point, 0.5, 2.0, 0.02]])
+    method(arm, [[*point, 0.5, 2.0, 0.0]], True)
+    move = getattr(call, own)
+    assert arm.mock_calls == [
+        move(point, 0.5, 2.0, wait=True),
+        move(point, 0.5, 2.0, wait=False),
+        call.move_path([make(point, 0.5, 2.0, 0.02)], wait=True),
+        call.move_path([make(point, 0.5, 2.0, 0.0)], wait=False),
+    ]

@@ -1,5 +1,6 @@
 """A calibration with the process of a virtual skin, by the command itself: file, scene, refusals, marks."""
 
+import argparse
 import json
 import math
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
+from coneskin.commands.calibrate import _forces
 from coneskin.scene.reader import load_scene
 from coneskin.scene.values.calibration_file import _read_calibrations
 from coneskin.testing.scenes import forearm_scene
@@ -101,6 +103,13 @@ def test_the_marks_are_listed_without_touching(tmp_path: Path, capsys: Output) -
 def test_what_cannot_be_touched_is_said(words: list[str], said: str, tmp_path: Path, capsys: Output) -> None:
     assert main(["calibrate", saved(tmp_path, "scene.toml", TEXT), *words]) == 1
     assert said in capsys.readouterr().err
+
+
+def test_forces_are_two_or_more_that_a_gauge_can_show() -> None:
+    assert _forces("1000,0.05") == (0.05, 1000.0)
+    for text in ("0.049,1", "1,1001", "5", "5,5"):
+        with pytest.raises(argparse.ArgumentTypeError, match=r"two or more forces from 0\.05 to 1000 N"):
+            _forces(text)
 
 
 def test_a_virtual_skin_with_other_sensors_is_refused(tmp_path: Path, capsys: Output) -> None:

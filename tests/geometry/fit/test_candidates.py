@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.candidates import _cylinders, find_axis_candidates
+from coneskin.geometry.fit.candidates import _cylinders, _same_side, find_axis_candidates
+from coneskin.geometry.fit.cone_fit import InfiniteCone
 
 from ..synthetic import frustum, rugby, shoulder
 from .axis_cases import hull
@@ -37,6 +38,13 @@ def test_two_normals_of_a_cylinder_give_its_radius() -> None:
     _, _, radius, _ = _cylinders(hull(frustum(0.05, 0.05, 0.3), 2000), np.random.default_rng(1))
     assert len(radius) > 1000
     assert np.mean(np.abs(radius / 0.05 - 1.0) < 0.1) > 0.9  # the others have a point of an end, or near the border
+
+
+def test_one_cone_seen_from_two_points_of_its_axis_is_one() -> None:
+    axis, ahead = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 0.1])
+    cone = InfiniteCone(np.zeros(3), axis, 0.05, math.atan(0.3))
+    assert _same_side(cone, InfiniteCone(ahead, axis, 0.08, math.atan(0.3)))
+    assert not _same_side(cone, InfiniteCone(ahead, axis, 0.02, math.atan(0.3)))
 
 
 @pytest.mark.long

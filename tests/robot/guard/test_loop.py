@@ -2,12 +2,14 @@
 
 import socket
 from types import SimpleNamespace
+from unittest.mock import Mock, call
 
 import pytest
 
 from coneskin.core.channel import Channel, pair
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
-from coneskin.robot.guard.loop import GuardLoop, GuardPorts
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
+from coneskin.robot.guard.loop import GuardLoop, GuardPorts, _Outbox
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
 
@@ -100,6 +102,20 @@ def test_a_skin_is_waited_for_only_where_no_descriptor_tells_that_it_has_bytes(e
     asked = []
     GuardLoop(core, GuardPorts(ends[0], skin))._read_skin(skin)
     assert (asked, core.taken) == ([timeout], [BlockKind.SKIN])
+
+
+def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
+    stops, setpoints, slider = Mock(), Mock(), Mock()
+    outbox = _Outbox(GuardPorts(ends[0], None, stops=stops, setpoints=setpoints, slider=slider))
+    speeds, program = JointVelocitySetpoint(7, (0.1,) * 6, 4.0), SetpointProgram(7, 9.0, 20.0)
+    for output in (UseStopPath(StopPath.COMMAND, 5.0), UseStopPath(StopPath.SLIDER, 5.0), speeds, program):
+        outbox.append(output)
+    outbox.append(SetSpeedSlider(0.25))
+    assert stops.mock_calls == [call.use(StopPath.COMMAND, 5.0), call.follow(program)]
+    assert setpoints.mock_calls == [call.write(speeds)]
+    assert slider.mock_calls == [call.set(0.0), call.set(0.25)]
+    names = [said.partition(b"\n")[0].decode() for said in outbox.sent]
+    assert names == ["command", "slider", "setpoint", "follow", "slider"]
 
 
 def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):

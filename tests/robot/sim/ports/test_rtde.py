@@ -87,7 +87,10 @@ def test_every_output_of_the_table_can_be_asked_for() -> None:
         ask(connection, pack(PacketKind.START))
         controller.update()
         (packet,), _ = split(connection.outputs())
-        assert len(Recipe(part).unpack(packet.payload)) == len(part)
+        values = dict(zip(part, Recipe(part).unpack(packet.payload), strict=True))
+        assert len(values) == len(part)
+        for name in values.keys() & {"tool_digital_output0_mode", "tool_digital_output1_mode"}:
+            assert values[name] == 1, "sinking"
 
 
 def test_unknown_outputs_are_named_in_their_place_without_an_empty_entry() -> None:
