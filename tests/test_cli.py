@@ -59,15 +59,18 @@ def parsers(command: str) -> dict[str, argparse.ArgumentParser]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_shows_an_example_and_exit_codes(
+def test_every_help_shows_an_example_and_exit_codes_as_wide_as_the_terminal(
     command: str, capsys: Output, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)  # an example of design writes a file as it is parsed
+    monkeypatch.setenv("COLUMNS", "70")
     for name, parser in parsers(command).items():
         assert run(*name.split(), "--help") == 0
         text = capsys.readouterr().out
         assert text.startswith("usage: coneskin " + ("design [LINK]" if name == "design" else name))
         assert "exit code" in text.lower(), name
+        about = text[text.index("\n\n") :]  # below the usage, in which argparse breaks no option
+        assert [line for line in about.splitlines() if len(line) > 70 and len(line.split()) > 2] == [], name
         examples = re.findall(rf"^  coneskin {name} (.*)$", parser.epilog or "", re.MULTILINE)
         assert examples, name
         for example in examples:

@@ -15,6 +15,7 @@ from pathlib import Path
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.core.files import read_file
+from coneskin.core.help_text import HelpFormatter
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 
@@ -36,7 +37,7 @@ Ctrl-C stops the controller. Exit code: 0 stopped; 1 it cannot listen there, or 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``coneskin sim-ur``."""
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.formatter_class = HelpFormatter
     parser.description = "Simulate a UR controller. The unmodified ur_rtde package connects to it and moves its arm."
     parser.epilog = EXAMPLE
     add = parser.add_argument

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from .core.errors import ConeSkinError, MissingExtra
+from .core.help_text import HelpFormatter
 from .core.text import printable
 from .core.version import __version__, code_build
 
@@ -107,7 +108,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         description="Touch-sensitive skin for robot arms: design it, guard an arm with it, replay its collisions.\n"
         f"Not a safety-rated device.\n{_listing()}",
         epilog="example:\n  coneskin demo\n  coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=HelpFormatter,
     )
     parser.add_argument(
         "--completion", metavar="SHELL", choices=_SHELLS, help=f"print the completion code of {', '.join(_SHELLS)}"
@@ -121,7 +122,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         child = commands.add_parser(
             name,
             description=help_text[0].upper() + help_text[1:] + ".",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=HelpFormatter,
         )
         if name == chosen:
             module = importlib.import_module(module_name)

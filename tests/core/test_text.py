@@ -3,6 +3,7 @@
 import io
 import json
 import math
+from html.parser import HTMLParser
 from typing import Any
 
 import pytest
@@ -11,7 +12,12 @@ from hypothesis import strategies as st
 
 from coneskin.core.recording.block import Block
 from coneskin.core.text import painted, read_json
-from coneskin.robot.guard.signals.journal import BlockKind, body_places, contact_force, decode_event
+from coneskin.design.link_design import design_link
+from coneskin.geometry.frustum import Frustum
+from coneskin.robot.guard.signals.journal import BlockKind, body_places, contact_force, decode_event, stopping_contact
+from coneskin.runs.replay.run import read_run
+from coneskin.session.outcome import STANDS, stop_error
+from tests.support.paths import COLLISION
 
 ANY_TEXT = st.text(st.characters())  # half pairs of UTF-16 among them
 VALUES = st.recursive(st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(), st.lists)
@@ -82,3 +88,38 @@ def test_a_terminal_gets_colours_and_a_file_gets_none(monkeypatch: pytest.Monkey
 def test_no_color_is_heeded_where_it_is_not_empty(value: str, wanted: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", value)
     assert painted("ok", "green", Terminal()) == wanted
+
+
+class Page(HTMLParser):
+    """The text of a page, and its elements."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.words, self.elements = "", set[str]()
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, _attributes: object) -> None:
+        self.elements.add(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.words += f" {data}"
+
+
+def test_designs_runs_and_collisions_have_a_line_and_for_a_notebook_a_picture_a_table_and_the_next_step() -> None:
+    run = read_run(COLLISION)
+    stop = next(event for event in run.events if event.name == "stopping")
+    collision = stop_error(stop, stopping_contact(stop, run.events), STANDS, "<b>")
+    design = design_link(Frustum(0.04, 0.07, 0.15))
+    for value, line, words in (
+        (run, "<Run 'scene.toml': 2.1 s, 14 events, whole>", ("touch located", "run.replay()")),
+        (collision, "<Collision 1: 'forearm skin' on 'forearm', u=130.0 mm, phi=89.0 deg", ("<b>", "session.reset(")),
+        (design, "<LinkDesign 'a link by its dimensions': <SheetDesign 'sheet 1': radii 40.0", ("write_design(",)),
+    ):
+        assert repr(value).startswith(line)
+        assert "\n" not in repr(value)
+        assert len(repr(value)) < 200
+        page = Page(value._repr_html_())
+        assert {"table", "code"} < page.elements
+        assert page.elements & {"svg", "img"}
+        for said in words:
+            assert said in page.words

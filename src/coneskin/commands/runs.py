@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.help_text import HelpFormatter
 from coneskin.core.text import printable
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(dest="job", metavar="JOB", required=True)
 
     def job(name: str, text: str, epilog: str) -> argparse.ArgumentParser:
-        about, kind = text[0].upper() + text[1:] + ".", argparse.RawDescriptionHelpFormatter
+        about, kind = text[0].upper() + text[1:] + ".", HelpFormatter
         made = jobs.add_parser(name, help=text, description=about, epilog=epilog, formatter_class=kind)
         made.add_argument("--json", action="store_true", help="print one JSON object")
         return made

@@ -173,6 +173,31 @@ class Collision(RobotError, RuntimeError):
         self.reaction = reaction
         self.event = event
 
+    def __repr__(self) -> str:
+        place = f"u={1e3 * self.u:.1f} mm, phi={math.degrees(self.phi):.1f} deg, level={self.level:.2f}"
+        return (
+            f"<Collision {self.number}: {self.sensor!r} on {self.link!r}, {place}, stands={self.standstill_confirmed}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the section of the link with the side that was touched, and the facts."""
+        from .text import html_card
+
+        x, y = 40.0 * math.cos(self.phi), -40.0 * math.sin(self.phi)
+        dot = "" if math.isnan(x) else f"<circle cx='{x:.1f}' cy='{y:.1f}' r='7' fill='#d646e0'/>"
+        edge = "<path d='M40 0H54' stroke='#111827'/><text x='57' y='4' font-size='10'>phi = 0</text>"
+        link = "<circle r='40' fill='none' stroke='#0c2c4a' stroke-width='5'/>"
+        rows = [
+            ("sensor", f"{self.sensor} on {self.link}"),
+            ("place", f"u = {1e3 * self.u:.1f} mm, phi = {math.degrees(self.phi):.1f} deg"),
+            ("certain", "yes" if self.location_valid else "no"),
+            ("level", f"{self.level:.2f}"),
+            ("reaction", self.reaction or "not known"),
+            ("measured standing", "yes" if self.standstill_confirmed else "no"),
+        ]
+        drawn = f"<svg viewBox='-55 -55 155 110' style='height:110px'>{link}{edge}{dot}</svg>"
+        return html_card(f"collision {self.number}", rows, f"session.reset(stop={self.number})", drawn)
+
 
 class RecordingError(ConeSkinError, ValueError):
     """A recording that cannot be read."""

@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Sequence
+from html import escape
 from typing import Any, TextIO
 
-__all__ = ["painted", "positive_seconds", "printable", "read_json"]
+__all__ = ["html_card", "painted", "positive_seconds", "printable", "read_json"]
 
 _MAX_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
 _HALF_PAIR = re.compile(rb"\\u[dD][89a-fA-F]")
@@ -87,3 +89,17 @@ def positive_seconds(text: str) -> float:
     if not value > 0.0:
         raise argparse.ArgumentTypeError(f"must be a number of seconds above 0, such as 2.5, got {text!r}")
     return value
+
+
+def html_card(title: str, rows: Sequence[tuple[str, str]], next_step: str, picture: str = "") -> str:
+    """Return what a notebook shows of a value: a picture, a table, and what to do next.
+
+    Args:
+        title: of the table.
+        rows: names and values; all that is text here is escaped.
+        next_step: a call or a command.
+        picture: HTML or SVG, as it is.
+    """
+    lines = "".join(f"<tr><th style='text-align:left'>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in rows)
+    shown = f"<div style='max-width:480px'>{picture}</div>" if picture else ""
+    return f"{shown}<b>{escape(title)}</b><table>{lines}</table><div>next: <code>{escape(next_step)}</code></div>"

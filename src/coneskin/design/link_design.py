@@ -240,6 +240,22 @@ class LinkDesign:
     folder: Path | None = None
     data: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        sheets = "; ".join(repr(sheet) for sheet in self.sheets)
+        return f"<LinkDesign {self.name!r}: {sheets}; {self.folder or 'not written'}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the upper conductive sheets flat, their dimensions, and the next call."""
+        from coneskin.core.text import html_card
+        from coneskin.geometry.drawing.svg import to_svg
+
+        drawn = "".join(to_svg([sheet.cuts[4]], sheet.name).partition("?>")[2] for sheet in self.sheets)
+        rows = [(sheet.name, sheet.dimensions) for sheet in self.sheets]
+        rows += [("note", note) for note in self.notes]
+        step = "write_design('skin', design.sheets)" if self.folder is None else f"open {self.folder}/report.md"
+        style = "<style>.coneskin-flat svg{max-width:100%;height:auto}.coneskin-flat g{stroke-width:.5px}</style>"
+        return html_card(f"design of {self.name}", rows, step, f"{style}<div class='coneskin-flat'>{drawn}</div>")
+
 
 def design_link(
     link: str | Path | Mesh | Frustum | Sequence[PlacedFrustum],

@@ -119,9 +119,9 @@ class StageNodes:
                 self._colours[sheet.name] = self._sheets[sheet.name].color = colour
         left = {link: list(nodes) for link, nodes in self._marks.items()}
         for mark in moment.marks:
-            sheet = self._sheet_of.get(mark.sensor)
-            if sheet is not None and (nodes := left[sheet.link]):
-                nodes.pop(0).show(mark, sheet.item.frustum)
+            touched = self._sheet_of.get(mark.sensor)
+            if touched is not None and (nodes := left[touched.link]):
+                nodes.pop(0).show(mark, touched.item.frustum)
         for nodes in left.values():
             for node in nodes:
                 node.hide()
@@ -154,7 +154,9 @@ class _MarkNodes:
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         arrow, faces = _arrow()
         there = Pose.trusted(along(mark.normal).rotation, mark.point)
-        _add_mesh(self._scene, f"{self._name}/normal", _single(there.apply_all(arrow)), faces, colour, shade)
+        _add_mesh(
+            self._scene, f"{self._name}/normal", _single(there.apply_all(arrow.astype(float))), faces, colour, shade
+        )
         turn = np.linspace(0.0, 2.0 * math.pi, _SEGMENT_COUNT + 1)
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
         ring = np.stack([radius * circle for radius in _RING_RADII])
@@ -227,7 +229,7 @@ def _half_axes(mark: ContactMark, side: PlacedFrustum) -> Floats:
     sizes = np.linalg.norm(axes, axis=1)
     turned = np.array([[-axes[0][1], axes[0][0]]]) / max(sizes[0], 1e-12)
     units = np.concatenate([axes[:1] / max(sizes[0], 1e-12), turned]) if sizes[0] > 0.0 else np.eye(2)
-    return units * np.maximum(sizes, _MIN_HALF_AXIS)[:, None]
+    return np.asarray(units * np.maximum(sizes, _MIN_HALF_AXIS)[:, None])
 
 
 def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Ints]:

@@ -202,6 +202,16 @@ class SheetDesign:
     above: str = ""
     seam_offset: float = 0.0
 
+    def __repr__(self) -> str:
+        return f"<SheetDesign {self.name!r}: {self.dimensions}>"
+
+    @property
+    def dimensions(self) -> str:
+        """Radii and wrap of the side of the link that it covers, in words."""
+        side = self.place.frustum
+        wrap = f"height {1e3 * side.height:.1f} mm, wrap {math.degrees(side.wrap):.0f} deg"
+        return f"radii {1e3 * side.radius1:.1f} and {1e3 * side.radius2:.1f} mm, {wrap}"
+
     @property
     def has_seam(self) -> bool:
         """Whether its two edges meet, or nearly; otherwise the link is bare between them."""

@@ -136,6 +136,30 @@ class Run:
     defects: tuple[Defect, ...] = ()
     copies: tuple[Block, ...] = ()
 
+    def __repr__(self) -> str:
+        since, until = self.span
+        whole = "whole" if self.complete else f"{len(self.defects)} defects"
+        return f"<Run {self.header.get('name')!r}: {until - since:.1f} s, {len(self.events)} events, {whole}>"
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the speed of the fastest joint and the touches, the events, the next call."""
+        from coneskin.core.text import html_card
+
+        since, until = self.span
+        scale, events = 480.0 / max(until - since, 1e-9), self.events
+        speeds = [(scale * (state.time - since), max(map(abs, state.qd))) for state in self.states()]
+        most = max((speed for _, speed in speeds), default=0.0) or 1.0
+        path = " ".join(f"{x:.1f},{100.0 - 90.0 * speed / most:.1f}" for x, speed in speeds)
+        ticks = (scale * (event.time - since) for event in events if event.name == EventName.CONTACT)
+        touches = "".join(f"<path d='M{x:.1f} 0V100' stroke='#d646e0' stroke-width='3'/>" for x in ticks)
+        line = f"<polyline points='{path}' fill='none' stroke='#1d7dc9'/>"
+        told = f"fastest joint, 0 to {most:.2f} rad/s, in {until - since:.2f} s; magenta: touches"
+        words = f"<text x='2' y='12' font-size='11'>{told}</text>"
+        lines = [describe(event, self.start).strip().partition("  ") for event in events]
+        rows = [("lacks", self.missing or "nothing"), *((time, text) for time, _, text in lines)]
+        drawn = f"<svg viewBox='0 0 480 102'>{touches}{line}{words}</svg>"
+        return html_card(f"run of {self.header.get('name')}", rows, "run.replay()", drawn)
+
     @property
     def start(self) -> float:
         """Host time at which the run was started [s]."""
