@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from coneskin.core.arrays import frozen
 from coneskin.core.errors import GeometryError
@@ -27,8 +27,6 @@ __all__ = ["DisplacementMap", "heights_by_ray", "measure_displacement"]
 
 Floats = NDArray[np.float64]
 
-_CHUNK_POINTS = 16384  # points computed at a time, so that the intermediate arrays stay in the cache
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplacementMap:
@@ -39,7 +37,6 @@ class DisplacementMap:
         heights: above the side, along its outward normal [m]; rows at equal steps of u from 0 to slant, columns at
             equal steps of phi from 0 to wrap, shape (k, p) with k and p at least 2. Of a full wrap the last column
             repeats the first.
-        clamped: share of the nodes that do not follow the mesh, because a hole is bridged or a height clamped there.
 
     Raises:
         GeometryError: fewer than two rows or columns, or a full wrap that does not close.
@@ -47,7 +44,6 @@ class DisplacementMap:
 
     placed: PlacedFrustum
     heights: Floats
-    clamped: float = 0.0
     _point: Callable[[float, float], Vector] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -66,52 +62,6 @@ class DisplacementMap:
         Beyond the ends and the edges of the sheet the cone continues with the height at the rim.
         """
         return self._point(u, phi)
-
-    def normal(self, phi: float) -> Vector:
-        """Return the outward unit normal of the cone in the link's frame; the normals of the facets jump by degrees."""
-        return self.placed.normal(phi)
-
-    def height(self, u: ArrayLike, phi: ArrayLike) -> Floats:
-        """Return the heights [m] above the side at (u [m], phi [rad]), arrays that broadcast."""
-        f = self.placed.frustum
-        rows, columns = self.heights.shape
-        u, phi = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
-        if f.wrap == math.tau:
-            phi = phi - math.tau * np.floor(phi / math.tau)
-        x = np.clip(u * ((rows - 1) / f.slant), 0.0, rows - 1)
-        y = np.clip(phi * ((columns - 1) / f.wrap), 0.0, columns - 1)
-        i = np.minimum(x.astype(np.int32), rows - 2)
-        j = np.minimum(y.astype(np.int32), columns - 2)
-        x, y = x - i, y - j
-        flat, at = self.heights.ravel(), i * np.int32(columns) + j
-        near = flat[at] * (1.0 - y) + flat[at + 1] * y
-        far = flat[at + columns] * (1.0 - y) + flat[at + columns + 1] * y
-        return np.asarray(near * (1.0 - x) + far * x)
-
-    def points(self, u: ArrayLike, phi: ArrayLike) -> Floats:
-        """Return the points of the mesh for arrays u [m] and phi [rad] of shape (n,): shape (n, 3) [m].
-
-        Raises:
-            GeometryError: u and phi have another number of dimensions than one.
-        """
-        us, phis = np.broadcast_arrays(np.asarray(u, float), np.asarray(phi, float))
-        if us.ndim != 1:
-            raise GeometryError(f"u and phi must have shape (n,), got {us.shape}")
-        if type(self.placed) is not PlacedFrustum:
-            points, normals = self.placed.place(us, phis)
-            return points + self.height(us, phis)[:, None] * normals
-        f, pose = self.placed.frustum, self.placed.link_frustum
-        sa, ca = f.sin_half_angle, f.cos_half_angle
-        turn, shift = np.array(pose.rotation).T, np.array(pose.translation)
-        result = np.empty((len(us), 3))
-        for start in range(0, len(us), _CHUNK_POINTS):
-            part = slice(start, start + _CHUNK_POINTS)
-            u_part, phi_part = us[part], phis[part]
-            height = self.height(u_part, phi_part)
-            rho = f.radius1 + u_part * sa + height * ca
-            local = np.stack([rho * np.cos(phi_part), rho * np.sin(phi_part), u_part * ca - height * sa], axis=1)
-            result[part] = local @ turn + shift
-        return result
 
 
 def _heights(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], float]:
@@ -213,9 +163,8 @@ def measure_displacement(
     shown = np.where(height > -depth, height + depth, 0.0)
     arc = 0.5 * (f.radius1 + f.radius2) * f.wrap / around
     closed = bridge_holes(shown, f.slant / along, arc, max_bridge, full) - depth
-    clamped = float((np.abs(height) > limit).mean())
     height = np.clip(np.where(height < -limit, closed, height), -limit, limit)
-    return DisplacementMap(placed, np.concatenate([height, height[:, :1]], axis=1) if full else height, clamped)
+    return DisplacementMap(placed, np.concatenate([height, height[:, :1]], axis=1) if full else height)
 
 
 def heights_by_ray(rays: RayCaster, placed: PlacedFrustum, u: Floats, phi: Floats, limit: float) -> Floats:

@@ -44,13 +44,6 @@ def _outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
         return points
 
 
-#: rotations that bring the named up axis to z, as COLLADA 1.4.1 describes the three frames
-_TO_Z_UP = {
-    "X_UP": ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)),
-    "Y_UP": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
-    "Z_UP": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-}
-
 _MAX_UNIT_DEPTH = 3  # elements within each other down to the unit: COLLADA, asset, unit
 
 
@@ -61,7 +54,7 @@ class _ColladaAsset:
     Attributes:
         unit: name of the unit.
         metres: length of the unit [m].
-        up_axis: a key of ``_TO_Z_UP``.
+        up_axis: the axis that the file calls up: X_UP, Y_UP or Z_UP.
     """
 
     unit: str = "m"  # COLLADA's own defaults for missing elements
@@ -73,7 +66,7 @@ def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
     """Read unit and up axis of a COLLADA file, whose entities are known to be harmless.
 
     Raises:
-        MeshError: malformed XML, a unit that is no length, an unknown axis.
+        MeshError: malformed XML, or a unit that is no length.
     """
     asset = _ColladaAsset()
     within: list[str] = []
@@ -98,8 +91,6 @@ def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
         raise MeshError(f"{path}: the unit tag must hold a number of metres: {error}") from error
     if not (math.isfinite(asset.metres) and asset.metres > 0.0):
         raise MeshError(f"{path}: the unit tag must hold metres above 0, got {asset.metres}")
-    if asset.up_axis not in _TO_Z_UP:
-        raise MeshError(f"{path}: up_axis must be X_UP, Y_UP or Z_UP, got {asset.up_axis!r}")
     return asset
 
 
@@ -198,22 +189,15 @@ class Mesh:
         return first
 
 
-def load_mesh(
-    path: str | Path,
-    unit: str | None = None,
-    up_axis: str = "ignore",
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
-) -> Mesh:
-    """Read a link's mesh.
+def load_mesh(path: str | Path, unit: str | None = None, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Mesh:
+    """Read a link's mesh. Its axes are kept, whatever COLLADA's up_axis says, as in RViz, MoveIt and Gazebo.
 
     Args:
         path: an STL, OBJ, DAE (COLLADA) or PLY file.
         unit: the file's unit, a key of ``UNITS``; None to take COLLADA's unit tag (unless it makes a link of over 5 m
             where millimetres make one), or to guess: a mesh of a largest extent under 5 is taken to be in metres, a
             larger one in millimetres. What was taken is in ``Mesh.notes``.
-        up_axis: what to do with COLLADA's up_axis tag: "ignore" keeps the file's axes, as RViz, MoveIt and Gazebo do,
-            so that the frame stays the link's; "apply" rotates Y_UP and X_UP files to z up, as COLLADA asks.
-        scale: factors along the axes, after the unit and the up axis, as a URDF's mesh tag has them.
+        scale: factors along the axes, after the unit, as a URDF's mesh tag has them.
 
     Returns:
         the mesh in metres, all parts of the file merged and welded.
@@ -225,8 +209,6 @@ def load_mesh(
     path = Path(path)
     if unit is not None and unit not in UNITS:
         raise MeshError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
-    if up_axis not in ("ignore", "apply"):
-        raise MeshError(f"up_axis must be 'ignore' or 'apply', got {up_axis!r}")
     try:
         data = read_file(path, MAX_SIZE)
     except OSError as exc:
@@ -237,18 +219,13 @@ def load_mesh(
         raise MeshError(f"{path}: the file is empty")
     notes = [TERMS.format(part.upper()) for part in path.resolve().parts if part.lower() in ("ur20", "ur30")]
     metres = None if unit is None else UNITS[unit]
-    asset = turn = None
+    asset = None
     if path.suffix.lower() == ".dae":
         refuse_entities(data, path)
         asset = _read_collada_asset(path, data)
-        if asset.up_axis != "Z_UP" and up_axis == "apply":
-            turn = np.array(_TO_Z_UP[asset.up_axis])
-            notes.append(f"rotated from {asset.up_axis} to z up")
-        elif asset.up_axis != "Z_UP":
+        if asset.up_axis != "Z_UP":
             notes.append(f"the file declares {asset.up_axis}; its axes are kept, as in RViz and MoveIt")
     vertices, faces = _read(path, data)
-    if turn is not None:
-        vertices = vertices @ turn.T
     _check_corners(faces, len(vertices), str(path))
     if metres is None:
         extent = float((np.ptp(vertices[_numbered_anew(faces, len(vertices))[0]], axis=0) * np.abs(scale)).max())

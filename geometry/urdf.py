@@ -82,7 +82,6 @@ def load_urdf_link(
     link: str,
     geometry: str = "visual",
     packages: Mapping[str, str | Path] | None = None,
-    up_axis: str = "ignore",
     arguments: Mapping[str, str] | None = None,
 ) -> Mesh:
     """Read the meshes of a link, scaled and placed as the URDF says, as one mesh.
@@ -93,7 +92,6 @@ def load_urdf_link(
         geometry: "visual" or "collision". Collision bodies are often convex hulls that have lost the tube.
         packages: folders of the ROS packages in package:// paths; others are searched for at and beside the folders
             above the URDF.
-        up_axis: what to do with COLLADA's up_axis tag, see ``load_mesh``.
         arguments: of a xacro file.
 
     Returns:
@@ -125,7 +123,7 @@ def load_urdf_link(
         origin = body.find("origin")
         xyz = _numbers("0 0 0" if origin is None else origin.get("xyz", "0 0 0"), f"{path}: xyz of {link}")
         rpy = _numbers("0 0 0" if origin is None else origin.get("rpy", "0 0 0"), f"{path}: rpy of {link}")
-        parts.append(load_mesh(file, unit, up_axis, scale).moved(Pose.from_xyz_rpy(xyz, rpy)))
+        parts.append(load_mesh(file, unit, scale).moved(Pose.from_xyz_rpy(xyz, rpy)))
     source = f"{path}: {link}"
     if not parts:
         other = "collision" if geometry == "visual" else "visual"

@@ -29,6 +29,7 @@ from coneskin.geometry.displacement_map import measure_displacement
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
+from coneskin.geometry.pose import Vector
 from coneskin.geometry.ray_casting import RayCaster
 
 Floats = NDArray[np.float64]
@@ -90,12 +91,16 @@ def map_rows(mesh: Mesh, sheet: FittedSheet) -> Iterator[tuple[str, Floats, floa
         start = time.perf_counter()
         grid = measure_displacement(mesh, sheet.placed, rows, columns, FIT_TOLERANCE, rays=rays)
         built = time.perf_counter() - start
+
+        def many(us: Floats, phis: Floats, point: Callable[[float, float], Vector] = grid.point) -> Floats:
+            return np.array(list(map(point, us.tolist(), phis.tolist())))
+
         yield (
             f"cone + grid {rows}x{columns}",
-            np.linalg.norm(grid.points(u, phi)[sound] - target, axis=1),
+            np.linalg.norm(many(u, phi)[sound] - target, axis=1),
             best(partial(grid.point, 0.05, 2.0), 20_000),
-            best(partial(grid.points, u[:1000], phi[:1000]), 20),
-            best(partial(grid.points, many_u, many_phi), repeat=3),
+            best(partial(many, u[:1000], phi[:1000]), 20),
+            best(partial(many, many_u, many_phi), repeat=1),
             built,
             grid.heights.size * (8.0 + 32.0),  # the array, and the floats and pointers of the lists
         )

@@ -47,7 +47,7 @@ def free(masses: Sequence[float]) -> None:
             continue
         for stretch in course.stretches:
             s, w, v = stretch.compression[0], stretch.rate[0], stretch.speed[0]
-            energy = 0.5 * arm * (w + v) ** 2 + 0.5 * body * v**2 + contact.law.energy(s)
+            energy = 0.5 * arm * (w + v) ** 2 + 0.5 * body * v**2 + contact.padding.energy(s)
             change = energy / (0.5 * arm * speed**2) - 1.0
             gain = max(gain, change)
             drift = max(drift, -change if loss == 0.0 else 0.0)

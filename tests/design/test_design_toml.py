@@ -33,7 +33,7 @@ def test_every_value_in_the_file_is_the_default_of_its_field(tmp_path: Path) -> 
     settings = read_settings(written(tmp_path, text))
     assert (settings.options, settings.files) == (DesignOptions(), FileOptions())
     search = dict(settings.search)
-    assert (search.pop("round_only"), search.pop("up_axis")) == (False, "ignore")
+    assert search.pop("round_only") is False
     assert FitOptions(**search) == FitOptions()
     assert len(search) == 7, "tolerance, number, length, wrap, bridge, hull, exposure"
 
@@ -69,7 +69,7 @@ def test_what_a_key_allows_its_field_takes(name: str, key: object) -> None:
         if math.isfinite(limit):
             limit += 1e-9 if key.above and limit == key.low else 0  # type: ignore[attr-defined]
             settings = read_settings(words=[f"{name}={limit!r}"])
-            FitOptions(**{k: v for k, v in settings.search.items() if k not in ("round_only", "up_axis")})
+            FitOptions(**{k: v for k, v in settings.search.items() if k != "round_only"})
 
 
 def test_a_setting_on_the_command_line_goes_before_the_file(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import MeshError, MissingExtra
-from coneskin.geometry.mesh import _TO_Z_UP, Mesh, _ColladaAsset, _read_collada_asset, load_mesh, make_mesh
+from coneskin.geometry.mesh import Mesh, _ColladaAsset, _read_collada_asset, load_mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_links
 
@@ -149,22 +149,10 @@ def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
     assert mesh.vertices[:, 1].min() == pytest.approx(-0.3, abs=1e-7)  # y is -z, not z
 
 
-def test_collada_up_axis_is_kept_and_said_or_applied(tmp_path: Path) -> None:
-    file = write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Y_UP</up_axis>")
-    kept, applied = load_mesh(file), load_mesh(file, up_axis="apply")
-    np.testing.assert_allclose(kept.size, [0.1, 0.1, 0.3], atol=1e-7)
-    assert any("Y_UP" in note and "kept" in note for note in kept.notes)
-    # y up becomes z up, so z becomes -y
-    np.testing.assert_allclose(applied.size, [0.1, 0.3, 0.1], atol=1e-7)
-    assert applied.vertices[:, 1].min() == pytest.approx(-0.3, abs=1e-7)
-    assert any("rotated from Y_UP" in note for note in applied.notes)
-
-
-@pytest.mark.parametrize("axis", ["X_UP", "Y_UP", "Z_UP"])
-def test_up_axes_turn_up_to_z_without_mirroring(axis: str) -> None:
-    turn = np.array(_TO_Z_UP[axis])
-    assert np.linalg.det(turn) == pytest.approx(1.0)
-    np.testing.assert_array_equal(turn @ np.eye(3)["XYZ".index(axis[0])], [0.0, 0.0, 1.0])
+def test_axes_are_kept_whatever_collada_calls_up(tmp_path: Path) -> None:
+    mesh = load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Y_UP</up_axis>"))
+    np.testing.assert_allclose(mesh.size, [0.1, 0.1, 0.3], atol=1e-7)
+    assert any("Y_UP" in note and "kept" in note for note in mesh.notes)
 
 
 def test_exploded_corners_are_welded() -> None:
@@ -290,8 +278,6 @@ def test_faces_that_name_no_corner() -> None:
 def test_options_out_of_range(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="unit must be one of m, cm, mm, inch, got 'yard'"):
         load_mesh(tmp_path / "a.stl", unit="yard")
-    with pytest.raises(MeshError, match="up_axis must be 'ignore' or 'apply', got 'z'"):
-        load_mesh(tmp_path / "a.stl", up_axis="z")
 
 
 def test_a_document_as_deep_as_it_is_long_is_read_once(tmp_path: Path) -> None:
@@ -305,8 +291,6 @@ def test_bad_collada_tags(tmp_path: Path) -> None:
         load_mesh(write_dae(tmp_path / "a.dae", TUBE, '<unit meter="0"/>'))
     with pytest.raises(MeshError, match="unit tag must hold a number of metres"):
         load_mesh(write_dae(tmp_path / "b.dae", TUBE, '<unit meter="one"/>'))
-    with pytest.raises(MeshError, match="up_axis must be X_UP, Y_UP or Z_UP, got 'W_UP'"):
-        load_mesh(write_dae(tmp_path / "c.dae", TUBE, "<up_axis>W_UP</up_axis>"))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])

@@ -2,12 +2,11 @@
 
 A ``.urp`` file is XML, packed with gzip or not. PolyScope writes the URScript of a program beside it, in a ``.script``
 file of the same name, and that is what runs. Without one, only a program whose single node is External Control is
-loaded. A ``.urpx`` file of PolyScope X is JSON that has the URScript in it.
+loaded.
 """
 
 from __future__ import annotations
 
-import json
 import re
 import xml.etree.ElementTree as ET
 import zlib
@@ -57,15 +56,13 @@ def _read_program(name: str, data: bytes) -> str:
     """Return the URScript of a program file.
 
     Args:
-        name: of the file, with ``.urp``, ``.urpx`` or ``.script``.
+        name: of the file, with ``.urp`` or ``.script``.
         data: its content.
 
     Raises:
         ScriptError: it is none of them, or a ``.urp`` of other nodes than External Control.
     """
     function = re.sub(r"\W", "_", name.rpartition(".")[0]) or "program"
-    if name.endswith(".urpx"):
-        return f"def {function}():\n{_script_of(name, data)}\nend\n"
     if not name.endswith(".urp"):
         text = data.decode("utf-8", "replace")
         lines = (line.strip() for line in text.splitlines())
@@ -92,13 +89,6 @@ def _read_program(name: str, data: bytes) -> str:
     once = main.get("runOnlyOnce") == "true"
     body = [EXTERNAL_CONTROL] if once else ["while True:", EXTERNAL_CONTROL, "sync()", "end"]
     return "\n".join([f"def {function}():", *body, "end", ""])
-
-
-def _script_of(name: str, data: bytes) -> str:
-    try:
-        return str(json.loads(data)["program"]["urscript"]["script"])
-    except (ValueError, KeyError, TypeError, RecursionError) as exc:
-        raise ScriptError(f"{name} is not a program of PolyScope X: {type(exc).__name__} {exc}") from exc
 
 
 #: where PolyScope has its programs, on a robot and in Universal Robots' own simulator

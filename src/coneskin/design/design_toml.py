@@ -71,7 +71,6 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             touch_side: side X, Y, Z on which touches are likely. The seam faces away from it
             weights: cover what counts: a CSV file with x_mm,y_mm,z_mm,weight of places
             exposure: cover what can be touched: areas count by the free space above them
-            up_axis: treatment of the up axis of a COLLADA file; RViz ignores it
             """,
             Key("tolerance_mm", default=1e-3, low=0.0, high=20.0, above=True),
             Key("max_sheets", int, 2, low=1, high=100),
@@ -85,7 +84,6 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             Key("touch_side", list, None, length=3, unset="none"),
             Key("weights", str, None, unset="all areas count the same"),
             Key("exposure", bool, False),
-            Key("up_axis", str, "ignore", choices=("ignore", "apply")),
         ),
     ),
     "layers": (
@@ -214,7 +212,7 @@ class _DesignSettings:
     Attributes:
         options: materials, widths and electronics.
         files: of the drawings.
-        search: keyword arguments of the search: fields of ``FitOptions``, ``round_only`` and ``up_axis``.
+        search: keyword arguments of the search: fields of ``FitOptions``, and ``round_only``.
     """
 
     options: DesignOptions

@@ -62,7 +62,6 @@ class LinkMesh:
 def load_link(
     link: str | Mesh,
     unit: str | None = None,
-    up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
     arguments: Mapping[str, str] | None = None,
 ) -> Iterator[LinkMesh]:
@@ -71,7 +70,6 @@ def load_link(
     Args:
         link: a mesh file, FILE.urdf#LINK, or a mesh; a xacro file is expanded.
         unit: of a mesh file; None to guess.
-        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages in a URDF's package:// paths (``load_urdf_link``).
         arguments: of a xacro file.
 
@@ -87,7 +85,7 @@ def load_link(
         return
     path, hash_sign, name = link.partition("#")
     if not hash_sign and not path.lower().endswith((".urdf", ".xacro")):
-        yield _named(load_mesh(path, unit, up_axis), Path(path).name)
+        yield _named(load_mesh(path, unit), Path(path).name)
         return
     from coneskin.geometry.urdf import load_urdf_link, urdf_links
 
@@ -97,7 +95,7 @@ def load_link(
     errors: list[MeshError] = []
     for kind in ("visual", "collision"):
         try:
-            mesh = load_urdf_link(path, name, kind, packages, up_axis, arguments)
+            mesh = load_urdf_link(path, name, kind, packages, arguments)
         except MeshError as exc:
             errors.append(exc)
             continue
@@ -119,7 +117,6 @@ def _named(mesh: Mesh, file: str) -> LinkMesh:
 def _fit_link(
     link: str | Mesh,
     unit: str | None,
-    up_axis: str,
     packages: Mapping[str, str | Path] | None,
     progress: Callable[[str], None],
     arguments: Mapping[str, str] | None,
@@ -135,7 +132,7 @@ def _fit_link(
     tries: list[tuple[LinkMesh, LinkFit]] = []
     if isinstance(link, str):
         progress(f"reading {link}")
-    for source in load_link(link, unit, up_axis, packages, arguments):
+    for source in load_link(link, unit, packages, arguments):
         progress(f"{source.name}: {len(source.mesh.faces)} faces")
         fit = find_link_sheets(source, progress, **search)
         # what the search noted goes beside the notes on the mesh
@@ -263,7 +260,6 @@ def design_link(
     *,
     options: DesignOptions | None = None,
     unit: str | None = None,
-    up_axis: str = "ignore",
     packages: Mapping[str, str | Path] | None = None,
     arguments: Mapping[str, str] | None = None,
     files: FileOptions | None = None,
@@ -279,7 +275,6 @@ def design_link(
         folder: to write; None to write nothing.
         options: of the design.
         unit: of a mesh file, a key of ``UNITS``; None to guess.
-        up_axis: how to treat COLLADA's up_axis tag (``load_mesh``).
         packages: folders of the ROS packages that a URDF names.
         arguments: of a xacro file.
         files: options of the drawings.
@@ -325,9 +320,7 @@ def design_link(
         places = (PlacedFrustum(link),)
     elif isinstance(link, str | Path | Mesh):
         origin = "" if isinstance(link, Mesh) else str(link)
-        source, fit = _fit_link(
-            link if isinstance(link, Mesh) else origin, unit, up_axis, packages, say, arguments, **search
-        )
+        source, fit = _fit_link(link if isinstance(link, Mesh) else origin, unit, packages, say, arguments, **search)
         places = fit
     else:
         places = link

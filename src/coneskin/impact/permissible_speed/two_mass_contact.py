@@ -114,21 +114,6 @@ class _CompressionLaw:
         """Force at rest at which the padding bottoms out [N]."""
         return self.soft * self.end
 
-    def elastic(self, compression: float) -> float:
-        """Return the force of a compression at rest [N]; 0 without one."""
-        if compression <= 0.0:
-            return 0.0
-        if compression <= self.end:
-            return self.soft * compression
-        return self.end_force + self.hard * (compression - self.end)
-
-    def energy(self, compression: float) -> float:
-        """Return the energy stored in a compression [J]."""
-        if compression <= 0.0:
-            return 0.0
-        soft, beyond = min(compression, self.end), max(0.0, compression - self.end)
-        return 0.5 * self.soft * soft**2 + beyond * (self.end_force + 0.5 * self.hard * beyond)
-
     def under(self, force: float) -> float:
         """Return the compression at rest under a force [m]."""
         if force <= self.end_force:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 
 import pytest
 
@@ -51,12 +50,3 @@ def test_a_packed_file_is_unpacked_to_a_bound_only() -> None:
 def test_a_script_is_taken_as_it_is_or_given_a_name() -> None:
     assert _read_program("a.script", b"# c\ndef p():\nend\n") == "# c\ndef p():\nend\n"
     assert _read_program("a.script", b"sleep(1)") == "def a():\nsleep(1)\nend\n"
-
-
-def test_a_program_of_polyscope_x_has_its_script_in_it() -> None:
-    facts = {"programInformation": {"name": "n"}, "urscript": {"script": '$ 1 "x"\nsleep(1)'}}
-    data = json.dumps({"program": facts}).encode()
-    assert _read_program("n.urpx", data) == 'def n():\n$ 1 "x"\nsleep(1)\nend\n'
-    for wrong in (b"{", b"[]", b'{"program": 1}', b"[" * 100_000):
-        with pytest.raises(ScriptError, match=r"n\.urpx is not a program"):
-            _read_program("n.urpx", wrong)
