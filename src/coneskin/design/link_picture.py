@@ -1,16 +1,18 @@
 """Pictures in space: a link with its sheets from two sides, what counts on it, and the printed parts of a jig.
 
-The link shows where the sheets are, their ends, and the faces to measure from.
+Each is cast ray by ray, so that what is nearer hides what is behind it, and needs no fewer faces than there are. The
+link shows where the sheets are, their ends, and the faces to measure from.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
@@ -20,16 +22,122 @@ from .workshop.jig import Collar
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
     from coneskin.geometry.fit.touch_weights import TouchWeights
-    from coneskin.geometry.mesh import Mesh
 
     from .workshop.placement import DatumFace
 
-__all__ = ["draw_jig", "draw_link", "draw_weights", "drawn_triangles"]
+__all__ = ["draw_jig", "draw_link", "draw_weights"]
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
-_BARE_COLOURS = ("#c4c8ce", "#d8c9a3", "#b3c7b0", "#cdb4c9", "#a9b8c9", "#e0b9a8")
+#: one for each reason why a part of a link is bare
+_BARE_COLOURS = ("#c3c8d0", "#ecd28b", "#a9d6ad", "#dbb0d6", "#a8cbee", "#f2b79b", "#b5e0dd", "#d8d3a6")
+_LINK_COLOUR = _BARE_COLOURS[0]
+_REASON_VOTES = 15  # samples of the hull nearest to a place, of which most have its reason
 _LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
-_MAX_FACES = 12000  # faces; matplotlib draws them in about a second
+_PIXELS = 900  # of a view's longer side
+_SHADE = 0.45  # of the brightness, in a face that the light grazes
+_EDGE_DEPTH = 0.015  # of the size: a step in depth that is drawn as an edge
+_OUTLINE_LIFT = 2e-3  # m by which lines stand off a surface, which lies up to the tolerance above a sheet's side
+
+
+class _View:
+    """A body from far away, as it is drawn on a plane: x to the right, y up [mm].
+
+    Args:
+        body: what is seen, and what hides.
+        way: direction to the viewer.
+    """
+
+    def __init__(self, body: Mesh, way: Any) -> None:
+        self.way = np.asarray(way) / np.linalg.norm(way)
+        right = np.cross((0.0, 0.0, 1.0) if abs(self.way[2]) < 0.99 else (0.0, 1.0, 0.0), self.way)
+        right /= np.linalg.norm(right)
+        self._screen = np.stack([right, np.cross(self.way, right)])
+        self._body, self._rays = body, RayCaster(body)
+        corners = self.flat(body.vertices)
+        self.low, self.high = corners.min(axis=0), corners.max(axis=0)
+        self.size = float((self.high - self.low).max())
+
+    def flat(self, points: Any) -> Any:
+        """Return where points [m] of shape (n, 3) are drawn [mm], shape (n, 2)."""
+        return 1e3 * np.asarray(points) @ self._screen.T
+
+    def sees(self, points: Any, normals: Any) -> Any:
+        """Return which points [m] of surfaces face the viewer with nothing before them, shape (n,)."""
+        seen = normals @ self.way > 0.02
+        ways = np.broadcast_to(self.way, points.shape).copy()
+        return seen & ~np.isfinite(self._rays.cast(points + _OUTLINE_LIFT * normals, ways)[0])
+
+    def draw_line(self, axes: Any, points: Any, normals: Any, **style: Any) -> Any:
+        """Draw a line on a surface where it is seen, and return where that is, shape (n,)."""
+        seen = self.sees(points, normals)
+        line = self.flat(points)
+        line[~seen] = np.nan
+        axes.plot(*line.T, **style)
+        return seen
+
+    def draw(self, axes: Any, colours: Callable[[Any, Any], Any], light: Any = None) -> None:
+        """Draw the body, its edges, and a scale.
+
+        Args:
+            axes: of matplotlib.
+            colours: from faces, shape (n,), and points on them [m], shape (n, 3), to red, green, blue, shape (n, 3).
+            light: direction to the light; None for colours that mean something.
+        """
+        step = self.size / (_PIXELS if self._rays.engine == "embree" else _PIXELS // 3)
+        x, y = (np.arange(low - step, high + 2.0 * step, step) for low, high in zip(self.low, self.high, strict=True))
+        across, along = (part.reshape(-1, 1) for part in np.meshgrid(1e-3 * x, 1e-3 * y))
+        far = 2.0 * float(np.abs(self._body.vertices).max())
+        origins = across * self._screen[0] + along * self._screen[1] + far * self.way
+        depth, face = self._rays.cast(origins, np.broadcast_to(-self.way, origins.shape).copy())
+        hit = face >= 0
+        picture = np.zeros((len(hit), 4))
+        picture[hit, :3], picture[hit, 3] = colours(face[hit], origins[hit] - depth[hit, None] * self.way), 1.0
+        if light is not None:
+            bright = np.abs(self._body.normals_and_areas()[0][face[hit]] @ (light / np.linalg.norm(light)))
+            picture[hit, :3] *= (1.0 - _SHADE + _SHADE * bright)[:, None]
+        shape = len(y), len(x)
+        deep = np.where(hit, depth, 3.0 * far).reshape(shape)
+        steps = [np.abs(np.diff(deep, axis=axis)) > 1e-3 * _EDGE_DEPTH * self.size for axis in (0, 1)]
+        edge = np.pad(steps[0], ((0, 1), (0, 0))) | np.pad(steps[1], ((0, 0), (0, 1)))
+        picture = picture.reshape((*shape, 4))
+        picture[edge] = (0.25, 0.25, 0.25, 1.0)
+        axes.imshow(
+            picture, origin="lower", extent=(x[0], x[-1] + step, y[0], y[-1] + step), interpolation="antialiased"
+        )
+        axes.axis("off")
+        corner = self.low - 0.12 * self.size
+        length = max(n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if n == 1 or n <= 0.3 * self.size)
+        end = np.array([self.high[0], corner[1]])
+        axes.plot([end[0] - length, end[0]], [end[1]] * 2, color=INK_COLOUR, lw=2.0, solid_capstyle="butt")
+        axes.text(end[0] - 0.5 * length, end[1] + 0.015 * self.size, f"{length} mm", ha="center", fontsize=9)
+        axes.set(xlim=(corner[0] - 0.12 * self.size, self.high[0] + 0.05 * self.size))
+        axes.set(ylim=(corner[1] - 0.12 * self.size, self.high[1] + 0.05 * self.size))
+
+    def draw_frame(self, axes: Any) -> None:
+        """Draw the directions of the frame."""
+        corner = self.low - 0.12 * self.size
+        for name, way in zip("xyz", 1e-3 * np.eye(3), strict=True):
+            tip = corner + 0.1 * self.size * self.flat(way)
+            axes.annotate("", tip, corner, arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
+            axes.text(*(corner + 0.13 * self.size * self.flat(way)), name, ha="center", va="center", fontsize=9)
+
+
+def _body(parts: Iterable[Any]) -> tuple[Mesh, Any]:
+    """Return triangles [m] of parts, each of shape (n, 3, 3), as one mesh, and the number of the part of each face."""
+    shown, owner = [], []
+    for number, triangles in enumerate(parts):
+        a, b, c = np.asarray(triangles).transpose(1, 0, 2)
+        flat = np.linalg.norm(np.cross(b - a, c - a), axis=1) <= 0.0  # at the tip of a cone
+        shown.append(triangles[~flat])
+        owner.append(np.full(np.count_nonzero(~flat), number))
+    corners = np.concatenate(shown).reshape(-1, 3)
+    return Mesh(corners, np.arange(len(corners)).reshape(-1, 3)), np.concatenate(owner)
+
+
+def _palette(names: Sequence[str]) -> Any:
+    from matplotlib.colors import to_rgb
+
+    return np.array([to_rgb(name) for name in names])
 
 
 def draw_link(
@@ -49,253 +157,146 @@ def draw_link(
         faces: flat faces of the link, drawn as outlines with their names.
     """
     first = designs[0].place.link_frustum
-    triangles, owner = _triangles(designs, mesh, areas)
-    rays = None if mesh is None else RayCaster(mesh)
+    body, owner = _body([*map(_outer_triangles, designs), *([] if mesh is None else [mesh.triangles])])
+    paints = _palette([_SHEET_COLOURS[index % 4] for index in range(len(designs))] + [_LINK_COLOUR])
+
+    def colours(hit: Any, points: Any) -> Any:
+        found = paints[owner[hit]]
+        if areas:
+            bare = owner[hit] == len(designs)
+            found[bare] = _palette(_BARE_COLOURS)[_reasons(points[bare], areas) % len(_BARE_COLOURS)]
+        return found
+
     for side, (x, y, z) in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, -0.35))):
-        axes = figure.add_axes((0.5 * side, 0.14, 0.5, 0.84), projection="3d", computed_zorder=False, proj_type="ortho")
         # slightly from the side; once from above and once from below, so that both ends are seen
-        view = np.array(first.rotate((x, y, z)))
-        light = np.array(first.rotate((x, -0.3 * y, 1.3 * z)))
-        _draw_side(axes, triangles, owner, view / np.linalg.norm(view), light / np.linalg.norm(light))
-        for index, design in enumerate(designs):
-            sight = _Sight(view / np.linalg.norm(view), rays, 1e-3 * float(np.ptp(triangles, axis=(0, 1)).max()))
-            _draw_electrodes(axes, design, sight)
-            _name_ends(axes, design, sight, _SHEET_COLOURS[index % 4])
+        axes = figure.add_axes((0.5 * side, 0.14, 0.48, 0.84))
+        view = _View(body, first.rotate((x, y, z)))
+        view.draw(axes, colours, np.array(first.rotate((x, -0.3 * y, 1.3 * z))))
+        view.draw_frame(axes)
+        for design in designs:
+            _draw_electrodes(axes, design, view)
         for face in faces:
-            _draw_face(axes, face, sight)
-    for area, colour in zip(areas, _BARE_COLOURS, strict=False):
-        axes.plot([], [], [], "s", color=colour, label=f"bare, {area.share:.0%}: {area.reason}")
+            _draw_face(axes, face, view)
+        _name_ends(axes, designs, view)
+    for number, area in enumerate(areas):
+        label = f"bare, {area.share:.0%}: {area.reason}"
+        axes.plot([], [], "s", color=_BARE_COLOURS[number % len(_BARE_COLOURS)], label=label)
     if areas:
         figure.legend(loc="lower center", fontsize="small", frameon=False)
 
 
-def _triangles(designs: Sequence[SheetDesign], mesh: Mesh | None, areas: Sequence[BareArea]) -> tuple[Any, list[str]]:
-    """Return what is drawn: triangles [mm], shape (n, 3, 3), and the colour of each."""
-    shown, colours = [], []
-
-    def add(triangles: Any, colour: str) -> None:
-        shown.append(triangles)
-        colours.extend([colour] * len(triangles))
-
-    if mesh is not None:
-        bare = drawn_triangles(mesh)
-        for design in designs:  # in the order of drawing, covered triangles would show through the sheets
-            bare = bare[~_covered(design, bare)]
-        for colour, part in _by_reason(bare, areas):
-            add(part * 1e3, colour)
-    for index, design in enumerate(designs):
-        grid = _outer_face(design, np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 121))
-        corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
-        p, q, r, s = (corner.reshape(-1, 3) for corner in corners)
-        add(np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)]), _SHEET_COLOURS[index % 4])
-    return np.concatenate(shown), colours
+def _outer_triangles(design: SheetDesign) -> Any:
+    """Return the triangles of a sheet's outer face [m], shape (n, 3, 3)."""
+    side = design.place.frustum
+    u, phi = np.meshgrid(np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181), indexing="ij")
+    grid = _outer_face(design, u, phi)[0]
+    p, q, r, s = (part.reshape(-1, 3) for part in (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]))
+    return np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
 
 
-def _draw_side(axes: Any, triangles: Any, colours: Sequence[str], view: Any, light: Any) -> None:
-    """Draw triangles [mm] as they are seen from a direction, with the axes of their frame."""
-    from matplotlib.colors import to_rgb
-    from matplotlib.ticker import MaxNLocator
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-
-    a, b, c = triangles.transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    size = np.linalg.norm(normal, axis=1)
-    bright = np.minimum(0.4 + 0.6 * np.abs(normal @ light) / np.where(size > 0.0, size, 1.0), 1.0)
-    known = {colour: to_rgb(colour) for colour in dict.fromkeys(colours)}
-    order = np.argsort(triangles.mean(axis=1) @ view)
-    paint = (bright[:, None] * np.array([known[colour] for colour in colours]))[order]
-    axes.add_collection3d(Poly3DCollection(triangles[order], facecolors=paint, edgecolors=paint, linewidths=0.3))
-    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    middle, least = 0.5 * (low + high), 0.1 * float((high - low).max())  # a flat link needs a box with a volume
-    low, high = np.minimum(low, middle - 0.5 * least), np.maximum(high, middle + 0.5 * least)
-    axes.set(**dict(zip(("xlim", "ylim", "zlim"), zip(low, high, strict=True), strict=True)))
-    axes.set_xlabel("x [mm]", labelpad=10)
-    axes.set_ylabel("y [mm]", labelpad=10)
-    axes.set_zlabel("z [mm]", labelpad=18)
-    axes.tick_params("z", pad=6)
-    for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
-        axis.set_major_locator(MaxNLocator(max(2, round(8 * span / (high - low).max()))))
-    axes.set_box_aspect(high - low, zoom=0.82)
-    axes.view_init(math.degrees(math.asin(view[2])), math.degrees(math.atan2(view[1], view[0])))
+def _outer_face(design: SheetDesign, u: Any, phi: Any) -> tuple[Any, Any]:
+    """Return points of the outer face [m], and their normals."""
+    points, normals = design.place.place(u, phi)
+    return points + design.options.stack.thickness * normals, normals
 
 
-class _Sight(NamedTuple):
-    """A viewer, to whom the link hides what is behind it."""
-
-    view: Any  #: direction to the viewer, a unit vector
-    rays: RayCaster | None  #: of the link
-    size: float  #: of the link [m]
-
-    def sees(self, points: Any, normals: Any) -> Any:
-        """Return which points [mm] face the viewer with nothing of the link before them, shape (n,)."""
-        seen = normals @ self.view > 0.02
-        if self.rays is not None and seen.any():
-            # off the mesh, which lies up to the tolerance above a sheet's side
-            depth, _ = self.rays.cast(1e-3 * points + 2e-3 * normals, np.broadcast_to(self.view, points.shape).copy())
-            seen &= ~np.isfinite(depth)
-        return seen
-
-
-def _draw_face(axes: Any, face: DatumFace, sight: _Sight) -> None:
-    """Draw the outline of a flat face of the link, with its name."""
-    if np.dot(face.normal, sight.view) < 0.05:
-        return
-    outline = 1e3 * (face.outline + 5e-4 * np.array(face.normal))
-    axes.plot(*np.concatenate([outline, outline[:1]]).T, "--", color=INK_COLOUR, lw=1.2)
-    axes.text(*outline.mean(axis=0), face.name, fontweight="bold", ha="center", va="center", bbox=_LABEL_BOX)
-
-
-def _name_ends(axes: Any, design: SheetDesign, sight: _Sight, colour: str) -> None:
-    """Write the name of the sheet and of its end beside each end, where the viewer sees it best."""
-    phi = np.linspace(0.0, 1.0, 121)
-    axis = np.array(design.place.link_frustum.rotate((0.0, 0.0, 1.0)))
-    for end, u in ((1, 0.0), (2, 1.0)):
-        points = _outer_face(design, [u], phi).reshape(-1, 3)
-        normals = design.place.place(np.zeros(len(phi)), phi * design.place.frustum.wrap)[1]
-        seen = sight.sees(points, normals)
-        if seen.mean() < 0.2:  # the other side shows it better
-            continue
-        best = int(np.where(seen, normals @ sight.view, -1.0).argmax())
-        aside = 40.0 * sight.size * (1.0 if end == 2 else -1.0) * axis
-        name = f"{design.name}, end {end}"
-        axes.text(*(points[best] + aside), name, color=colour, fontsize=8, ha="center", va="center", bbox=_LABEL_BOX)
-
-
-def _by_reason(triangles: Any, areas: Sequence[BareArea]) -> list[tuple[str, Any]]:
-    """Return colours, each with the bare triangles [m] that have it: those nearest to the samples of one reason."""
-    if not areas or len(triangles) == 0:
-        return [("#c4c8ce", triangles)]
+def _reasons(points: Any, areas: Sequence[BareArea]) -> Any:
+    """Return the numbers of the areas that places [m] of shape (n, 3) belong to: those of most samples near them."""
     from scipy.spatial import cKDTree
 
-    points = np.concatenate([area.points for area in areas])
     owner = np.repeat(np.arange(len(areas)), [len(area.points) for area in areas])
-    nearest = owner[cKDTree(points).query(triangles.mean(axis=1))[1]]
-    return [(_BARE_COLOURS[n % len(_BARE_COLOURS)], triangles[nearest == n]) for n in np.unique(nearest)]
+    near = cKDTree(np.concatenate([area.points for area in areas])).query(points, min(_REASON_VOTES, len(owner)))[1]
+    votes = owner[near.reshape(len(points), -1)]
+    return np.stack([(votes == number).sum(axis=1) for number in range(len(areas))]).argmax(axis=0)
 
 
-def _outer_face(design: SheetDesign, u: Any, phi: Any) -> Any:
-    """Return points of the outer face [mm] at fractions of slant and wrap, shape (k, p, 3)."""
-    thickness, place = design.options.stack.thickness, design.place
-    side = place.frustum
-    points, normals = place.place(np.asarray(u)[:, None] * side.slant, np.asarray(phi)[None, :] * side.wrap)
-    return 1e3 * (points + thickness * normals)
+def _draw_face(axes: Any, face: DatumFace, view: _View) -> None:
+    """Draw the outline of a flat face of the link, with its name."""
+    outline, middle = np.concatenate([face.outline, face.outline[:1]]), face.outline.mean(axis=0, keepdims=True)
+    normals = np.broadcast_to(np.array(face.normal), outline.shape)
+    if view.draw_line(axes, outline, normals, ls="--", color=INK_COLOUR, lw=1.2).any():
+        at = view.flat(middle)[0]
+        axes.text(*at, face.name, fontweight="bold", ha="center", va="center", bbox=_LABEL_BOX)
 
 
-def _draw_electrodes(axes: Any, design: SheetDesign, sight: _Sight) -> None:
-    """Draw the middle lines of the electrodes and the two edges where the viewer sees them."""
+def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
+    """Write the names of the sheets and of their ends beside the picture, with lines to where the viewer sees them."""
+    names: list[tuple[Any, str, str]] = []
+    for index, design in enumerate(designs):
+        side = design.place.frustum
+        phi = np.linspace(0.0, side.wrap, 121)
+        for end, u in ((1, 0.0), (2, side.slant)):
+            points, normals = _outer_face(design, np.full(len(phi), u), phi)
+            seen = view.sees(points, normals)
+            if seen.mean() >= 0.2:  # else the other side shows it better
+                flat = view.flat(points[seen])
+                right = flat[flat[:, 0].argmax()]
+                names.append((right, f"{design.name}, end {end}", _SHEET_COLOURS[index % 4]))
+    below = -math.inf
+    for at, name, colour in sorted(names, key=lambda item: float(item[0][1])):
+        below = max(below + 0.06 * view.size, float(at[1]))
+        place = view.high[0] + 0.04 * view.size, below
+        arrow = {"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate(name, at, place, color=colour, fontsize=9, va="center", arrowprops=arrow, annotation_clip=False)
+
+
+def _draw_electrodes(axes: Any, design: SheetDesign, view: _View) -> None:
+    """Draw the middle lines of the electrodes, and the ends and edges, where the viewer sees them."""
     side = design.place.frustum
-    along, around = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 1.0, 121)
-    lines: list[tuple[str, Any, Any]] = []
+    along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
+    for u, phi in _border(design):
+        view.draw_line(axes, *_outer_face(design, u, phi), color=INK_COLOUR, lw=1.0)
     for name in "BADC":
         u, phi = design.layout.electrode_middle(name, 0.0, 0.0)
-        lines.append((name, [u / side.slant], around) if name in "AB" else (name, along, [phi / side.wrap]))
-    for name, share, turn in (*lines, ("", along, [0.0]), ("", along, [1.0])):
-        points = _outer_face(design, share, turn).reshape(-1, 3)
-        azimuths = np.broadcast_to(turn, points.shape[:1]) * side.wrap
-        seen = sight.sees(points, design.place.place(np.zeros(len(azimuths)), azimuths)[1])
-        points[~seen] = np.nan
-        axes.plot(*points.T, color=FOIL_COLOUR if name else INK_COLOUR, lw=2.0 if name else 1.0)
-        if name and seen.sum() >= 0.1 * len(seen):
-            middle = points[seen][seen.sum() // 3 if name in "AB" else seen.sum() // 2]
-            axes.text(*middle, name, color="white", fontweight="bold", ha="center", va="center")
+        line = (np.full(len(around), u), around) if name in "AB" else (along, np.full(len(along), phi))
+        points, normals = _outer_face(design, *line)
+        seen = view.draw_line(axes, points, normals, color=FOIL_COLOUR, lw=2.0)
+        if seen.sum() >= 0.1 * len(seen):
+            at = view.flat(points[seen])[seen.sum() // 3 if name in "AB" else seen.sum() // 2]
+            box = {"boxstyle": "circle,pad=0.15", "facecolor": FOIL_COLOUR, "edgecolor": "none"}
+            axes.text(*at, name, color="white", fontsize=8, fontweight="bold", ha="center", va="center", bbox=box)
 
 
-def drawn_triangles(mesh: Mesh) -> Any:
-    """Return the triangles of a mesh [m], merged in cells if there are too many to draw."""
-    faces, vertices = mesh.faces, mesh.vertices
-    size = float(np.ptp(vertices, axis=0).max())
-    cell = size / 120.0
-    while len(faces) > _MAX_FACES:
-        keys = np.round(vertices / cell).astype(np.int64)
-        _, first, place = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        vertices, faces = vertices[first], place.reshape(-1)[faces]
-        faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
-        faces = faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
-        cell *= 1.3
-    triangles = vertices[faces]
-    for _ in range(8):  # halve long triangles: in the order of drawing they would cover nearer ones
-        edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-        long = edges.max(axis=1) > size / 20.0
-        if not long.any() or len(triangles) > 4 * _MAX_FACES:
-            break
-        turned = np.stack([np.roll(t, -k, axis=0) for t, k in zip(triangles[long], edges[long].argmax(1), strict=True)])
-        a, b, c = turned.transpose(1, 0, 2)
-        middle = 0.5 * (a + b)
-        halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
-        triangles = np.concatenate([triangles[~long], *halves])
-    return triangles
-
-
-def _covered(design: SheetDesign, triangles: Any) -> Any:
-    """Return whether a sheet covers each triangle [m], shape (n,)."""
+def _border(design: SheetDesign) -> list[tuple[Any, Any]]:
+    """Return slant distances and azimuths of the ends and edges of a sheet."""
     side = design.place.frustum
-    u, phi, height = design.place.locate_all(triangles)
-    covered = (u >= 0.0) & (u <= side.slant) & (np.abs(height) < design.options.stack.thickness)
-    covered &= phi % (2.0 * math.pi) <= side.wrap
-    return covered.all(axis=1)
+    along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
+    ends = [(np.full(len(around), u), around) for u in (0.0, side.slant)]
+    return [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
 
 
-_OUTLINE_COLOR = "#d1495b"
-_OUTLINE_LIFT = 1e-3  # m; by which outlines stand off the outer face, so that they are not hidden
-
-
-def draw_weights(figure: Any, triangles: Any, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
-    """Draw the link from two sides, each area in the colour of its weight as a share of the largest.
+def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
+    """Draw the link from two sides, each place in the colour of its weight as a share of the largest.
 
     Args:
         figure: an empty figure of matplotlib.
-        triangles: of the link [m], shape (n, 3, 3).
+        mesh: of the link.
         designs: the sheets, of which the outlines are drawn.
         weights: what an area counts.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    colours, scale = colormaps["viridis"], Normalize(0.0, 1.0)
-    paint = colours(weights.at(triangles.mean(axis=1)))
+    colours = colormaps["viridis"]
     first = designs[0].place.link_frustum
-    low, high = 1e3 * triangles.min(axis=(0, 1)), 1e3 * triangles.max(axis=(0, 1))
     panels = []
     for number, way in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, 0.35)), 1):
-        axes = figure.add_subplot(1, 2, number, projection="3d", computed_zorder=False, proj_type="ortho")
-        view = np.array(first.rotate(way))
-        view /= np.linalg.norm(view)
-        order = np.argsort(triangles.mean(axis=1) @ view)
-        axes.add_collection3d(
-            Poly3DCollection(1e3 * triangles[order], facecolors=paint[order], edgecolors=paint[order], linewidths=0.3)
-        )
+        axes = figure.add_subplot(1, 2, number)
+        view = _View(mesh, first.rotate(way))
+        view.draw(axes, lambda _, points: colours(weights.at(points))[:, :3])
+        view.draw_frame(axes)
         for design in designs:
-            for line, normals in _outlines(design):
-                line[normals @ view < 0.0] = np.nan
-                axes.plot(*line.T, color=_OUTLINE_COLOR, lw=1.5)
-        axes.set(
-            xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]), xlabel="x [mm]", ylabel="y [mm]"
-        )
-        axes.set_zlabel("z [mm]")
-        axes.set_box_aspect(np.maximum(high - low, 0.1 * float((high - low).max())), zoom=0.9)
-        axes.view_init(math.degrees(math.asin(view[2])), math.degrees(math.atan2(view[1], view[0])))
-        axes.tick_params(labelsize=7)
+            for u, phi in _border(design):
+                view.draw_line(axes, *_outer_face(design, u, phi), color="#d1495b", lw=1.5)
         panels.append(axes)
-    bar = figure.colorbar(ScalarMappable(scale, colours), ax=panels, location="bottom", shrink=0.6)
+    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), colours), ax=panels, location="bottom", shrink=0.6)
     bar.set_label(f"what an area counts by {weights.name}, as a share of the largest; red: the sheets")
-
-
-def _outlines(design: SheetDesign) -> list[tuple[Any, Any]]:
-    """Return points [mm] and normals of the ends and edges of a sheet's outer face."""
-    side, height = design.place.frustum, design.options.stack.thickness + _OUTLINE_LIFT
-    along, around = np.linspace(0.0, side.slant, 40), np.linspace(0.0, side.wrap, 180)
-    found = []
-    for u, phi in ((0.0, around), (side.slant, around), (along, 0.0), (along, side.wrap)):
-        points, normals = design.place.place(u, phi)
-        found.append((1e3 * (points + height * normals), normals))
-    return found
 
 
 _LIGHT_DIRECTION = np.array([0.35, -0.55, 0.76])
 _PART_DISTANCE = 0.25  # of the radius of a part: how far the parts are drawn from each other
-_PART_COLORS = ((0.42, 0.62, 0.78), (0.85, 0.62, 0.40), (0.55, 0.72, 0.50), (0.72, 0.58, 0.76))
+_PART_COLOURS = ("#6b9ec7", "#d99e66", "#8cb880", "#b894c2")
 
 
 def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
@@ -305,39 +306,34 @@ def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
         figure: an empty figure of matplotlib.
         collars: at least one.
     """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    grid = figure.subplots(1, len(collars), subplot_kw={"projection": "3d", "proj_type": "ortho"}, squeeze=False)
+    grid = figure.subplots(1, len(collars), squeeze=False)
+    paints = _palette(_PART_COLOURS)
     for axes, collar in zip(grid.flat, collars, strict=True):
-        shown, paint = [], []
         turned = -1.0 if collar.end == 1 else 1.0  # as it stands, end 1 is upside down
-        for part in collar.parts:
-            middle = 0.5 * (part.start + part.end)
-            aside = 0.5 * _PART_DISTANCE * max(part.surface.size[:2])
-            off = np.array([aside * math.cos(middle), turned * aside * math.sin(middle), 0.0])
-            triangles = 1e3 * (part.surface.vertices[part.surface.faces] + off)
-            a, b, c = triangles.transpose(1, 0, 2)
-            normal = np.cross(b - a, c - a)
-            size = np.linalg.norm(normal, axis=1)
-            bright = 0.55 + 0.45 * (normal @ _LIGHT_DIRECTION) / np.where(size > 0.0, size, 1.0)
-            shown.append(triangles)
-            paint.append(np.clip(np.outer(bright, _PART_COLORS[(part.number - 1) % len(_PART_COLORS)]), 0.0, 1.0))
-            at = 1e3 * (part.surface.vertices.mean(axis=0) + off)
-            at[:2] += 0.35e3 * max(part.surface.size[:2]) * np.array([math.cos(middle), turned * math.sin(middle)])
-            name = f"part {part.number}" + (", begins at edge 0" if part.number == 1 else "")
-            axes.text(at[0], at[1], -8.0, name, fontsize=9, ha="center", zorder=10, bbox=_LABEL_BOX)
-        triangles = np.concatenate(shown)
-        drawn = Poly3DCollection(triangles, facecolors=np.concatenate(paint), edgecolors="none", clip_on=False)
-        axes.add_collection3d(drawn)
-        low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect(high - low, zoom=0.85)  # the box is turned: its corners reach beyond the axes
-        axes.view_init(38.0, math.degrees(_view(turned * angle for p in collar.parts for angle in (p.start, p.end))))
-        axes.set_title(f"end {collar.end}", fontsize=10)
-        axes.axis("off")
+        middles = [0.5 * (part.start + part.end) for part in collar.parts]
+        ways = [np.array([math.cos(middle), turned * math.sin(middle), 0.0]) for middle in middles]
+        body, owner = _body(
+            part.surface.vertices[part.surface.faces] + 0.5 * _PART_DISTANCE * max(part.surface.size[:2]) * way
+            for part, way in zip(collar.parts, ways, strict=True)
+        )
+        turn = _clear_azimuth(turned * angle for part in collar.parts for angle in (part.start, part.end))
+        high = math.radians(38.0)
+        view = _View(body, (math.cos(high) * math.cos(turn), math.cos(high) * math.sin(turn), math.sin(high)))
+        numbers = np.array([part.number - 1 for part in collar.parts])[owner] % len(paints)
+        view.draw(axes, lambda hit, _, own=numbers: paints[own[hit]], _LIGHT_DIRECTION)
+        for part, way in zip(collar.parts, ways, strict=True):
+            out = view.flat(way) / np.linalg.norm(view.flat(way))
+            own = view.flat(body.vertices)
+            reach = float((own @ out).max()) + 0.06 * view.size  # beyond all of it
+            middle = own.mean(axis=0)
+            at = middle + (reach - float(middle @ out)) * out
+            name = f"part {part.number}" + (",\nbegins at edge 0" if part.number == 1 else "")
+            aside = "center" if abs(out[0]) < 0.3 else "left" if out[0] > 0.0 else "right"
+            axes.text(*at, name, fontsize=9, ha=aside, va="center", bbox=_LABEL_BOX)
+        axes.set_title(f"end {collar.end}", fontsize=10, loc="left")
 
 
-def _view(cuts: Iterable[float]) -> float:
+def _clear_azimuth(cuts: Iterable[float]) -> float:
     """Return the azimuth of a view [rad] in which no cut plane is seen edge-on: the picture would look cropped."""
     at = np.radians(np.arange(-175.0, 185.0, 5.0))
     slant = np.abs(np.sin(at[:, None] - np.array(list(cuts)))).min(axis=1)

@@ -13,7 +13,7 @@ from coneskin.core.errors import MissingExtra
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
-from .link_picture import draw_jig, draw_link, draw_weights, drawn_triangles
+from .link_picture import draw_jig, draw_link, draw_weights
 from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
@@ -80,7 +80,7 @@ def draw_pictures(
     if weights is not None and mesh is not None:
         progress("drawing what counts")
         caption = f"What counts on the link, by {weights.name}, from two sides."
-        picture("weights", (10, 6), caption, draw_weights, drawn_triangles(mesh), designs, weights)
+        picture("weights", (10, 6), caption, draw_weights, mesh, designs, weights)
     for design, item in zip(designs, figures, strict=True):
         name, title = design.name.replace(" ", "-"), design.name.capitalize()
         progress(f"{design.name}: drawing the layout")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS
+from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.sector import unroll
@@ -23,6 +23,8 @@ __all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout", "draw_parts", "draw_seam"
 INK_COLOUR = "#222222"
 FOIL_COLOUR = "#c27c0e"
 _ACTIVE_COLOUR = "#9fd3c7"
+_NAMED_ELECTRODES = {2: "CD", 3: "CD", 5: "AB", 6: "AB"}  # number of a part -> those on it
+_NAME_BOX = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
 
 
 def _xy(outline: Outline, tolerance: float = 5e-5) -> tuple[list[float], list[float]]:
@@ -143,6 +145,16 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
         axes.text(*at(*layout.electrode_middle(name, 0.5 * slant, 0.42 * wrap)), name, **style, fontweight="bold")
 
 
+def _electrode_names(design: SheetDesign, cut: CutSheet) -> list[tuple[str, float, float]]:
+    """Return the names of the electrodes on a part, and where they are in its drawing [mm]."""
+    cone, way = cut.surface, -1.0 if cut.face == "inside" else 1.0
+    found = []
+    for name in _NAMED_ELECTRODES.get(cut.number, ""):
+        x, y = drawing_point(cone, *design.layout.electrode_middle(name, 0.5 * cone.slant, 0.42 * cone.wrap))
+        found.append((name, 1e3 * way * x, 1e3 * y))
+    return found
+
+
 def draw_parts(figure: Any, design: SheetDesign) -> None:
     """Draw all seven cut sheets of a sensor with their dimensions in mm.
 
@@ -156,6 +168,8 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
             for stroke in part.strokes:
                 colour = tuple(value / 255.0 for value in LINE_COLOURS[stroke.kind])
                 axes.plot(*_xy(stroke.outline, 1e-4), color=colour, lw=0.7)
+        for name, x, y in _electrode_names(design, cut):
+            axes.text(x, y, name, fontsize=7, ha="center", va="center", bbox=_NAME_BOX)
         x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
         off = 0.05 * max(x1 - x0, y1 - y0)
         arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
@@ -227,6 +241,11 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
                 colour = {"hole": "#b3007a", "score": "#2040c0", "fold": "#0a7d24"}.get(stroke.kind)
                 if colour:
                     axes.plot(*slanted(stroke.outline), color=colour, lw=0.5)
+        way = -1.0 if cut.face == "inside" else 1.0
+        for name, x, y in _electrode_names(design, cut):
+            axes.text(
+                way * x + lean * y, squeeze * y + lift, name, fontsize=7, ha="center", va="center", bbox=_NAME_BOX
+            )
     for level, cut in enumerate(stacked):  # beside the parts, however far the last of them lean
         label = f"{cut.number}  {cut.name}\n    {cut.material}\n    drawing: {cut.face} up"
         axes.text(right + 0.03 * width, level * pitch + 0.2 * squeeze * depth, label, fontsize=8, va="center")
@@ -262,7 +281,7 @@ def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
     heights = [stack.face_offset(i) * 1e3 * scale for i in range(6)]
     colours = ("#e8d9c0", "#55585e", "#cfe3f1", "#55585e", "#e8d9c0")
     axes.fill_between([-reach - shown_gap, reach], -0.12 * reach, 0.0, color="#c4c8ce")
-    axes.text(0.0, -0.06 * reach, "link", ha="center", va="center", fontsize=9)
+    axes.text(-0.5 * shown_gap, -0.06 * reach, "link", ha="center", va="center", fontsize=9)
     arc = 1e3 * radius
     whole = (0.0, 0.0)
     lower, upper = (_insets(shape, layout.sheet.wrap, u, arc) for shape in (layout.lower, layout.upper))
