@@ -33,8 +33,8 @@ _BARE_COLOURS = ("#c3c8d0", "#ecd28b", "#a9d6ad", "#dbb0d6", "#a8cbee", "#f2b79b
 _LINK_COLOUR = _BARE_COLOURS[0]
 _REASON_VOTES = 15  # samples of the hull nearest to a place, of which most have its reason
 _LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.0}
-_PIXELS = 900  # of a view's longer side
-_SHADE = 0.45  # of the brightness, in a face that the light grazes
+_VIEW_PIXELS = 900  # of a view's longer side
+_GRAZING_SHADE = 0.45  # of the brightness, in a face that the light grazes
 _EDGE_DEPTH = 0.015  # of the size: a step in depth that is drawn as an edge
 _OUTLINE_LIFT = 2e-3  # m by which lines stand off a surface, which lies up to the tolerance above a sheet's side
 
@@ -83,7 +83,7 @@ class _View:
             colours: from faces, shape (n,), and points on them [m], shape (n, 3), to red, green, blue, shape (n, 3).
             light: direction to the light; None for colours that mean something.
         """
-        step = self.size / (_PIXELS if self._rays.engine == "embree" else _PIXELS // 3)
+        step = self.size / (_VIEW_PIXELS if self._rays.engine == "embree" else _VIEW_PIXELS // 3)
         x, y = (np.arange(low - step, high + 2.0 * step, step) for low, high in zip(self.low, self.high, strict=True))
         across, along = (part.reshape(-1, 1) for part in np.meshgrid(1e-3 * x, 1e-3 * y))
         far = 2.0 * float(np.abs(self._body.vertices).max())
@@ -94,7 +94,7 @@ class _View:
         picture[hit, :3], picture[hit, 3] = colours(face[hit], origins[hit] - depth[hit, None] * self.way), 1.0
         if light is not None:
             bright = np.abs(self._body.normals_and_areas()[0][face[hit]] @ (light / np.linalg.norm(light)))
-            picture[hit, :3] *= (1.0 - _SHADE + _SHADE * bright)[:, None]
+            picture[hit, :3] *= (1.0 - _GRAZING_SHADE + _GRAZING_SHADE * bright)[:, None]
         shape = len(y), len(x)
         deep = np.where(hit, depth, 3.0 * far).reshape(shape)
         steps = [np.abs(np.diff(deep, axis=axis)) > 1e-3 * _EDGE_DEPTH * self.size for axis in (0, 1)]
