@@ -13,7 +13,9 @@ rows sum to zero, with exactly these six numbers beside the two known sheets.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +23,9 @@ from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
 from .sheet import SectorSheet
+
+if TYPE_CHECKING:
+    Numbers = float | Floats
 
 __all__ = [
     "ELECTRODES",
@@ -77,6 +82,13 @@ class Coupling:
         x, y = centre[:, 0], centre[:, 1]
         error = np.full(g.shape, np.nan) if error is None else error
         return cls(g, x, y, w[:, 1, 1] - g * x * x, w[:, 1, 2] - g * x * y, w[:, 2, 2] - g * y * y, error)
+
+    def numbers(self) -> tuple[Numbers, Numbers, Numbers, Numbers, Numbers, Numbers]:
+        """Return the six numbers, of a single scene as plain ones: arithmetic of these takes a tenth of the time."""
+        g, x, y, xx, xy, yy = self.conductance, self.x, self.y, self.xx, self.xy, self.yy
+        if g.size == 1:
+            return g.item(), x.item(), y.item(), xx.item(), xy.item(), yy.item()
+        return g, x, y, xx, xy, yy
 
     def matrix(self) -> Floats:
         """Return W [S], shape (n, 3, 3), symmetric."""
@@ -217,69 +229,77 @@ def solve_phase(
     """
     upper = sheet.breadth / (upper_resistance * sheet.length)
     lower = sheet.length / (lower_resistance * sheet.breadth)
-    n = len(coupling)
-    opens = [math.isinf(t.resistance) for t in phase.terminals]
+    numbers = coupling.numbers()
+    g, x, y, xx, xy, yy = numbers
+    a, b, c, d = terminals = phase.terminals
+    opens = [t.resistance == math.inf for t in terminals]
     if (opens[0] and opens[1]) and (opens[2] and opens[3]):
         raise FieldError(f"phase {phase.name}: all four electrodes are open; drive at least one sheet")
     for pair, first in (("A and B", 0), ("C and D", 2)):
-        if opens[first] and opens[first + 1] and not (coupling.conductance > 0.0).all():
+        if opens[first] and opens[first + 1] and not (g > 0.0 if isinstance(g, float) else (g > 0.0).all()):
             raise FieldError(
                 f"phase {phase.name}: without contact nothing fixes the potential of {pair}, which are open;"
                 " give their terminals a resistance, as every ADC has"
             )
-    ideal = all(t.resistance == 0.0 and t.lead == 0.0 for t in phase.terminals if not math.isinf(t.resistance))
-    if ideal and opens == [False, False, True, True]:
-        electrodes, contact = np.empty((n, 4)), np.zeros(n)
-        electrodes[:, 0], electrodes[:, 1] = phase.a.emf, phase.b.emf
-        _guides(
-            electrodes[:, 2:], coupling.x, coupling.y, coupling.xy / (lower + coupling.yy), phase.b.emf, phase.a.emf
-        )
-    elif ideal and opens == [True, True, False, False]:
-        electrodes, contact = np.empty((n, 4)), np.zeros(n)
-        electrodes[:, 2], electrodes[:, 3] = phase.c.emf, phase.d.emf
-        _guides(
-            electrodes[:, :2], coupling.y, coupling.x, coupling.xy / (upper + coupling.xx), phase.d.emf, phase.c.emf
-        )
+    ideal = [t.resistance == 0.0 == t.lead for t in terminals]
+    volts: tuple[Numbers, ...]
+    contact = None
+    if ideal == [True, True, False, False] and opens == [False, False, True, True]:
+        volts = a.emf, b.emf, *_guides(x, y, xy / (lower + yy), b.emf, a.emf)
+    elif ideal == [False, False, True, True] and opens == [True, True, False, False]:
+        volts = *_guides(y, x, xy / (upper + xx), d.emf, c.emf), c.emf, d.emf
     else:
-        ideal = False
-        electrodes, contact = _general(coupling, upper, lower, phase)
-    currents = _currents(coupling, upper, lower, electrodes, contact)
-    currents[:, opens] = 0.0
-    if ideal:
-        return Readings(phase, electrodes, electrodes, currents, contact)
-    resistance = np.array([t.resistance if not o else 0.0 for t, o in zip(phase.terminals, opens, strict=True)])
-    lead = np.array([t.lead for t in phase.terminals])
-    emf = np.array([t.emf for t in phase.terminals])
+        solved, contact = _general(coupling, upper, lower, phase)
+        volts = tuple(solved.T)
+    n = len(coupling)
+    if contact is None:
+        columns = volts, _currents(numbers, upper, lower, volts, 0.0, opens)
+        electrodes, currents = (np.array([c]) if n == 1 else _columns(n, c) for c in columns)
+        return Readings(phase, electrodes, electrodes, currents, np.zeros(n))
+    electrodes = _columns(n, volts)
+    currents = _columns(n, _currents(numbers, upper, lower, volts, contact, opens))
+    resistance = np.array([t.resistance if not o else 0.0 for t, o in zip(terminals, opens, strict=True)])
+    lead = np.array([t.lead for t in terminals])
+    emf = np.array([t.emf for t in terminals])
     # Behind a small source resistance the emf is the better reference, before a large input the electrode.
     from_source = (resistance < lead + 1.0 / min(upper, lower)) & ~np.array(opens)
-    terminals = np.where(from_source, emf - resistance * currents, electrodes + lead * currents)
-    return Readings(phase, electrodes, terminals, currents, contact)
+    read = np.where(from_source, emf - resistance * currents, electrodes + lead * currents)
+    return Readings(phase, electrodes, read, currents, contact)
 
 
-def _guides(out: Floats, along: Floats, across: Floats, moved: Floats, start: float, end: float) -> None:
-    """Solve the open guides of one sheet, the other driven from `start` to `end`; written to columns (far, near).
+def _columns(n: int, columns: Sequence[Numbers]) -> Floats:
+    out = np.empty((n, 4))
+    for place, column in enumerate(columns):
+        out[:, place] = column
+    return out
+
+
+def _guides(along: Numbers, across: Numbers, moved: Numbers, start: float, end: float) -> tuple[Numbers, Numbers]:
+    """Return the potentials (far, near) of one sheet's open guides, the other sheet driven from `start` to `end`.
 
     No net current passes, so the sheets meet at the electrical centre: start + h along = near + (far - near) across.
     The guides are apart by the current moved across over their sheet's conductance, for each volt of h.
     """
     h = end - start
     apart = h * moved
-    out[:, 1] = start + h * along - apart * across
-    out[:, 0] = out[:, 1] + apart
+    near = start + h * along - apart * across
+    return near + apart, near
 
 
-def _currents(coupling: Coupling, upper: float, lower: float, volts: Floats, contact: Floats) -> Floats:
+def _currents(
+    numbers: Sequence[Numbers],
+    upper: float,
+    lower: float,
+    volts: Sequence[Numbers],
+    contact: Numbers,
+    opens: list[bool],
+) -> list[Numbers]:
     """Return the current into the sensor at each electrode; they sum to zero by construction."""
-    hx = volts[:, 0] - volts[:, 1]
-    hy = volts[:, 3] - volts[:, 2]
-    qx = coupling.xx * hx + coupling.xy * hy + coupling.x * contact
-    qy = coupling.xy * hx + coupling.yy * hy + coupling.y * contact
-    out = np.empty_like(volts)
-    out[:, 0] = upper * hx + qx
-    out[:, 1] = contact - out[:, 0]
-    out[:, 2] = -lower * hy - qy
-    out[:, 3] = -contact - out[:, 2]
-    return out
+    _, x, y, xx, xy, yy = numbers
+    hx, hy = volts[0] - volts[1], volts[3] - volts[2]
+    a = upper * hx + xx * hx + xy * hy + x * contact
+    c = -lower * hy - xy * hx - yy * hy - y * contact
+    return [0.0 if o else current for current, o in zip((a, contact - a, c, -contact - c), opens, strict=True)]
 
 
 def _general(coupling: Coupling, upper: float, lower: float, phase: DrivePhase) -> tuple[Floats, Floats]:

@@ -20,6 +20,7 @@ from coneskin.core.errors import FieldError
 from .disc import Disc, Discs, check_discs
 from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
 from .multipole import FIRST, LADDER, higher, resolution, solve_discs
+from .one_scene import scene_solver
 from .rim import near_apex, solve_rims
 from .sheet import SectorSheet
 
@@ -73,10 +74,8 @@ class FieldModel:
         """
         if not discs:
             raise FieldError("at least one contact is needed; for no contact give one of conductance 0")
-        u, phi, radius, conductance = (
-            np.array([[getattr(d, name) for d in discs]]) for name in ("u", "phi", "radius", "conductance")
-        )
-        return self.contacts(u, phi, radius, conductance)
+        scene = [(d.u, d.phi, d.radius, d.conductance) for d in discs]
+        return self._one_scene(scene) or self.contacts(*np.array([scene], dtype=np.float64).T.swapaxes(1, 2))
 
     def contacts(
         self,
@@ -98,14 +97,28 @@ class FieldModel:
         Raises:
             FieldError: a disc that cannot be; the tolerance cannot be met (only without `order`).
         """
-        arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (u, phi, radius, conductance)))
+        given = u, phi, radius, conductance
+        # A plain number at a time is solved before numpy has read it.
+        if (
+            order is None and all(type(v) is float for v in given) and (one := self._one_scene([given]))  # type: ignore[list-item]
+        ):
+            return one
+        arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in given))
         if arrays[0].ndim not in (0, 1, 2):
             raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
         shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]
         check_discs(self.sheet, *shaped)
         if order is not None and order < 1:
             raise FieldError(f"order must be at least 1, got {order}")
+        if order is None and shaped[0].shape[0] == 1:
+            scene = list(zip(*(a[0].tolist() for a in shaped), strict=True))
+            if (one := self._one_scene(scene)) is not None:
+                return one
         return self._in_groups(Discs(*shaped), order)
+
+    def _one_scene(self, scene: Sequence[tuple[float, float, float, float]]) -> Coupling | None:
+        solver = scene_solver(self.sheet, self.upper_resistance, self.lower_resistance, self.tolerance)
+        return solver.solve(scene)
 
     def admittance(self, coupling: Coupling) -> Floats:
         """Compute Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""

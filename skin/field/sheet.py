@@ -108,7 +108,7 @@ class SectorSheet:
     @property
     def length(self) -> float:
         """Side L of the rectangle between the arcs A and B [m]."""
-        return float(_log1p_over(self.curvature, self.width))
+        return math.log1p(self.curvature * self.width) / self.curvature if self.curvature else self.width
 
     @property
     def breadth(self) -> float:

@@ -35,11 +35,10 @@ def disc_arrays(problem: Problem) -> tuple[Array, Array, Array, Array]:
     return u, phi, radius, conductance
 
 
-def solve_discs(problem: Problem, order: int | None = None) -> PortSolution:
-    """Solve four-port and both phases of one scene of discs; `order` None lets the solver choose."""
+def solve_discs(problem: Problem, order: int | None = None, coupling: Coupling | None = None) -> PortSolution:
+    """Solve four-port and both phases of one scene of discs, at an order, or from a known coupling."""
     sensor = field_model(problem)
-    u, phi, radius, conductance = disc_arrays(problem)
-    return _ports(problem, sensor, sensor.contacts(u, phi, radius, conductance, order=order))
+    return _ports(problem, sensor, coupling or sensor.contacts(*disc_arrays(problem), order=order))
 
 
 def solve_general(problem: Problem, directions: int = 32, rings: int = 7) -> PortSolution:
