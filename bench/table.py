@@ -29,6 +29,10 @@ BENCHES = {
     # the guard's loop
     "loop": Bench("bench.loop.stages", "ur_rtde, the controller, the arm, a real serial adapter, a busy machine."),
     "compiled": Bench("bench.loop.compiled", "Ports, processes and the driver: inputs come from memory."),
+    "exploration": Bench(
+        "bench.loop.exploration",
+        "States that differ in a time or a number only: of each abstract state one is followed.",
+    ),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
     "start": Bench("bench.loop.start", "The start of an arm's driver."),
     "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),

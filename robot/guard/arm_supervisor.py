@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ArmModel
@@ -25,6 +25,7 @@ from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.state_age import StateAge
 
 from .activation import ControllerNeeds
 from .arm_stop import ArmStop
@@ -40,94 +41,6 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
-
-_OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
-
-
-class _ControllerClock:
-    """Map from the controller's time to the host's monotonic time.
-
-    A state is read late when the host is busy, never early. So the smallest difference of the two clocks over some
-    seconds is the true one but for the quickest path through the network (0.1 to 0.3 ms). Drift has no time to show.
-    """
-
-    def __init__(self) -> None:
-        self._before = self._now = math.inf  # smallest differences of the last window and of this one
-        self._since = self._newest = -math.inf
-
-    def measured_at(self, host: float, controller: float) -> float:
-        """Take the two times of a state that was just read and return when it was measured.
-
-        Args:
-            host: when it was read [s].
-            controller: its own time [s]. Where it runs backwards the controller has started anew.
-
-        Returns:
-            host time at which it was measured [s], never later than ``host``.
-        """
-        if controller < self._newest:
-            self._before = self._now = math.inf
-            self._since = controller
-        elif controller - self._since > _OFFSET_WINDOW:
-            self._before, self._now, self._since = self._now, math.inf, controller
-        self._newest = controller
-        difference = host - controller
-        if difference < self._now:
-            self._now = difference
-        smallest = self._now if self._now < self._before else self._before
-        return min(controller + smallest, host)
-
-
-_MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
-_LAG_TIME: Final = 0.02  # s for which they must be as late
-
-
-class _StateAge:
-    """Age of the states of one controller: whether they stay away, repeat themselves, or come later than they may.
-
-    A queue in the network that fills lets states come later and later, and no time between two of them is long. A host
-    that was held up reads many late ones at once and then the newest, which is none.
-
-    Args:
-        limit: longest age of the newest state [s].
-    """
-
-    def __init__(self, limit: float) -> None:
-        self._limit = limit
-        self._clock = _ControllerClock()
-        self._controller_time = -math.inf  # the latest so far
-        self._fresh = -math.inf  # host time of the newest state that was a new one
-        self._late_since = self._very_late_since = math.inf  # host times of the first state that came so late
-
-    def feed(self, state: ControllerState) -> float:
-        """Take a state that was just read, and return the host time at which it was measured [s]."""
-        measured_at = self._clock.measured_at(state.time, state.controller_time)
-        if state.controller_time > self._controller_time:
-            self._controller_time, self._fresh = state.controller_time, state.time
-            lag = state.time - measured_at
-            self._late_since = min(self._late_since, state.time) if lag > _MAX_SUPERVISION_LAG else math.inf
-            self._very_late_since = min(self._very_late_since, state.time) if lag > self._limit else math.inf
-        return measured_at
-
-    def silent(self, now: float) -> bool:
-        """Tell whether the newest state is too old at a host time [s]. One whose time does not go on is."""
-        return now - self._fresh > self._limit
-
-    def trouble(self, now: float) -> str:
-        """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
-        if self.silent(now):
-            return f"the controller has sent no state for {1e3 * self._limit:g} ms"
-        if now - self._very_late_since > self._limit:
-            causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
-            return f"the controller's states come more than {1e3 * self._limit:g} ms late: {causes}"
-        return ""
-
-    def stale(self, now: float) -> str:
-        """Return why they cannot supervise a motion away at a host time [s]. Empty where they can."""
-        if now - self._late_since <= _LAG_TIME:
-            return ""
-        limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"
-        return f"the controller's states come more than {limit} late, too late to move away by"
 
 
 class ArmSupervisor:
@@ -185,7 +98,7 @@ class ArmSupervisor:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
         self._away = MotionAway(planner, self.internal_control)
-        self.state_age = _StateAge(limits.arm_silence)
+        self.state_age = StateAge(limits.arm_silence)
         self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
         self._ending = False
@@ -337,8 +250,11 @@ class ArmSupervisor:
         self.state = state
         stop, measured_at = self._stop, self.state_age.feed(state)
         self._away.feed(measured_at, state)
+        if self.state_age.stepped:
+            self._away.bar("the controller's clock has stepped")
         if stop.under_way:
-            self._brake(state, measured_at, out)
+            if self.state_age.fresh:
+                self._brake(state, measured_at, out)
         elif self._away.under_way:
             self._move(state, out)
         elif self._speed_limit is not None and self.phase is Phase.ACTIVE:

@@ -294,6 +294,9 @@ class GuardCore:
             return
         now = state.time
         arm.sample(state, out)
+        if (stepped := arm.state_age.stepped) and arm.phase is not Phase.STARTING:
+            what = "the controller's clock has stepped"
+            self._add_fault(now, f"{what} by {stepped:+.3f} s: do not set it while the arm is guarded", out, what)
         if state.stopped_by_safety and arm.phase.watched:
             self._add_fault(now, "the controller's own safety system has stopped the arm", out)
         elif not state.powered and arm.phase.watched:

@@ -19,6 +19,7 @@ from coneskin.robot.driver.values import ControllerState, StopPath
 
 from .limits import MonitoringLimits
 from .standstill import WATCH_DURATION, StandstillWatch
+from .state_age import StateAge
 from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 __all__ = ["BackupStop", "StandstillHold"]
@@ -62,7 +63,7 @@ class BackupStop:
         self._reader = reader
         self._clock = clock
         self._state: ControllerState | None = None  # the newest
-        self._fresh = -math.inf  # when it came
+        self._age = StateAge(limits.arm_silence)
         self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried
         self._quiet_until = -math.inf
         self._used: list[StopPath] = []  # by the newest stop
@@ -74,7 +75,7 @@ class BackupStop:
 
     def states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
         """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
-        return self._clock() - self._fresh > max(2.0 * self._limits.arm_silence, at_least)
+        return self._age.silent(self._clock(), max(2.0 * self._limits.arm_silence, at_least))
 
     def stop(
         self, deceleration: float | None = None, over: Callable[[], bool] = _never, strongest: bool = False
@@ -99,7 +100,7 @@ class BackupStop:
         budget = limits.stop_budget(speed or 0.0, gentle)
         stop = StopMonitor(now, speed, paths, limits.escalate, budget, limits.standstill, limits.arm_silence)
         look_at = now
-        while stop.standing_at is None and now - max(start, self._fresh) < _BLIND_TIMEOUT and not over():
+        while stop.standing_at is None and now - max(start, self._age.fresh_at) < _BLIND_TIMEOUT and not over():
             if now >= look_at:
                 self.reconnect(gentle)
                 look_at = self._clock() + _REOPEN_PERIOD
@@ -127,7 +128,9 @@ class BackupStop:
         if self._connections.reopen() and not self._use(StopPath.PROGRAM, deceleration):
             self._use(StopPath.COMMAND, deceleration)  # what was sent over the old ones may be lost
         now = self._clock()
-        if now - max(self._fresh, self._opened) < (_BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT):
+        if now - max(self._age.fresh_at, self._opened) < (
+            _BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT
+        ):
             return
         self._close_reader()
         with suppress(ConeSkinError):  # the next look tries again
@@ -141,10 +144,9 @@ class BackupStop:
             for payload in [] if self._reader is None else self._reader.read():
                 state = self._driver.decode_state(self._clock(), payload)
                 states.append(state)
-                if self._state is None or state.controller_time != self._state.controller_time:
-                    self._fresh = state.time
-                    if stop is not None:
-                        stop.sample(state.time, state.speed)
+                measured_at = self._age.feed(state)
+                if self._age.fresh and stop is not None:
+                    stop.sample(state.time, state.speed, measured_at)
                 self._state = state
         except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
             self._close_reader()

@@ -60,7 +60,6 @@ class StopMonitor:
         self._standstill = standstill
         self._silence = silence
         self._began = self._newest = self._arrived = now
-        self._last = -math.inf
         self._next = now + patience * (PROTECTIVE_PATIENCE if paths[:1] == (StopPath.PROTECTIVE,) else 1.0)
         self._budget = budget
         self._deadline = now + budget
@@ -79,7 +78,7 @@ class StopMonitor:
         self.standing_at: float | None = None
 
     def sample(self, time: float, speed: float, measured_at: float | None = None) -> None:
-        """Take a measured speed.
+        """Take the speed of a fresh state (``state_age``).
 
         Args:
             time: host time at which it was read [s].
@@ -89,9 +88,9 @@ class StopMonitor:
         """
         self._arrived = time
         measured_at = time if measured_at is None else measured_at
-        if measured_at < self._began or measured_at <= self._last:  # a repeated state is not a new one
+        if measured_at < self._began:
             return
-        self._newest = self._last = measured_at
+        self._newest = measured_at
         if self._top is None or (speed > self._top and self.slowed_at is None):
             self._top = speed  # it may still have been speeding up when the stop was commanded
         slower = self._top - speed >= min(_SPEED_DROP, 0.1 * self._top)

@@ -9,14 +9,19 @@ from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState
-from coneskin.robot.guard.arm_supervisor import _ControllerClock, _StateAge
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.state_age import StateAge
 from tests.support.guard_rig import GuardRig, touch
 
 CYCLE = 0.002
+
+
+def state_at(host, controller):
+    """A standing arm's state, read at a host time, of a controller's time."""
+    return ControllerState(host, controller, *STANDING)
 
 
 def run(clock, delays, start=1000.0, offset=500.0, rate=1.0):
@@ -24,14 +29,14 @@ def run(clock, delays, start=1000.0, offset=500.0, rate=1.0):
     results = []
     for k, delay in enumerate(delays):
         true = start + rate * CYCLE * k
-        results.append((clock.measured_at(true + delay, start - offset + CYCLE * k), true, true + delay))
+        results.append((clock.feed(state_at(true + delay, start - offset + CYCLE * k)), true, true + delay))
     return results
 
 
 @given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=200))
 def test_never_before_it_was_measured_never_after_it_was_read(delays):
     quickest = float("inf")
-    for (measured, true, read), delay in zip(run(_ControllerClock(), delays), delays, strict=True):
+    for (measured, true, read), delay in zip(run(StateAge(0.05), delays), delays, strict=True):
         quickest = min(quickest, delay)
         # 1e-9: differences of numbers near 1000 s, which have 1e-13 each
         assert true - 1e-9 <= measured <= read
@@ -39,16 +44,16 @@ def test_never_before_it_was_measured_never_after_it_was_read(delays):
 
 
 def test_drift_of_100_ppm_does_not_pile_up():
-    results = run(_ControllerClock(), [0.0002 if k % 7 else 0.0001 for k in range(60_000)], rate=1.0 + 1e-4)
+    results = run(StateAge(0.05), [0.0002 if k % 7 else 0.0001 for k in range(60_000)], rate=1.0 + 1e-4)
     worst = max(abs(measured - true) for measured, true, _ in results)
     assert worst < 2 * 5.0 * 1e-4 + 0.0003  # two windows of 5 s at 100 ppm, and the delay itself
 
 
 def test_a_controller_that_starts_anew():
-    clock = _ControllerClock()
+    clock = StateAge(0.05)
     run(clock, [0.0001] * 10)
-    assert clock.measured_at(2000.0, 0.002) == 2000.0  # nothing is known of its clock yet
-    assert abs(clock.measured_at(2000.010, 0.004) - 2000.002) < 1e-9
+    assert clock.feed(state_at(2000.0, 0.002)) == 2000.0  # nothing is known of its clock yet
+    assert abs(clock.feed(state_at(2000.010, 0.004)) - 2000.002) < 1e-9
 
 
 PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
@@ -136,20 +141,34 @@ def test_a_host_that_was_held_up_reads_late_states_at_once_and_moves_on(seconds)
     assert "late" not in rig.event("retreated").details["why"]
 
 
-@pytest.mark.parametrize("step", [-0.002, -0.004])  # the mock arm's own clock goes on by 0.002 s
-def test_a_controller_whose_time_runs_backwards_or_stands_still_is_silent(step):
+def test_a_controller_whose_time_stands_still_is_silent():
     rig = GuardRig(speed=0.3).run(0.5)
     for _ in range(100):
-        rig.arm.clock += step
-        rig.run(0.002)
+        rig.arm.clock -= CYCLE  # the mock arm's own clock goes on by as much
+        rig.run(CYCLE)
     assert rig.event("stopping").details["why"] == "the controller has sent no state for 50 ms"
     assert rig.event("stopping").time < rig.now - 0.1
+
+
+@pytest.mark.parametrize("step", [-10.0, 3600.0])
+def test_a_clock_that_steps_is_one_stop_with_its_reason_and_a_reset_is_enough(step):
+    """Back for good, or ahead for one state. It was 990 stops in 10 s, and no reset."""
+    rig = GuardRig(speed=0.3, reaction=Reaction("stop")).run(0.5)
+    rig.arm.clock += step
+    rig.run(CYCLE)
+    rig.arm.clock -= max(step, 0.0)
+    rig.run(1.0)
+    assert rig.names.count("stopping") == 1
+    assert "clock has stepped by" in rig.event("stopping").details["why"]
+    assert rig.core.phase is Phase.LATCHED
+    rig.reset()
+    assert rig.run(1.0).core.phase is Phase.ACTIVE
 
 
 @pytest.mark.parametrize("period", [0.002, 0.008], ids=["e-Series", "CB3"])
 @pytest.mark.parametrize("drift", [-1e-3, 1e-3])  # ten times what quartz does
 def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
-    age, seen = _StateAge(0.05), []
+    age, seen = StateAge(0.05), []
     for k in range(round(60.0 / period)):
         measured = k * period
         held = measured % 0.1 < 0.03  # the reader takes up to 30 ms of them at once, ten times a second
@@ -160,7 +179,7 @@ def test_neither_drift_nor_a_busy_reader_is_a_lag(period, drift):
 
 
 def test_a_simulator_that_falls_behind_is_a_lag_that_says_so():
-    age = _StateAge(0.05)
+    age = StateAge(0.05)
     for k in range(4000):
         age.feed(ControllerState(0.002 * k, 0.98 * 0.002 * k, *STANDING))
     assert "does not keep up with its clock" in age.trouble(8.0)

@@ -1,0 +1,95 @@
+"""Exploration of the guard to the end of its states, and of the four processes around it.
+
+    python -m bench exploration [--wrong 1] [--compiled]
+
+The core is fed what a guard is fed, by a world in which anything may happen at any time, as long as so many things are
+wrong at once. States are abstract: the phase and the facts that decide, without times and numbers. Each invariant is
+broken once on purpose. With --compiled the build in build/compiled is explored, and nothing is broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from bench.report import head, show
+from tests.support.exploration.explorer import Exploration, explore
+from tests.support.exploration.guard_world import CONTROLS, INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
+from tests.support.exploration.process_world import PROCESS_INVARIANTS, Parts, ProcessWorld
+
+ROOT = Path(__file__).parents[2]
+COLUMNS = ["states", "steps", "depth", "closed", "invariants", "broken", "seconds"]
+#: silences that somebody listens for: without each of them the arm goes on
+PARTS = ("program_silence", "process_silence", "guard_silence", "session_silence", "watchdog")
+
+
+def row(name: str, found: Exploration, invariants: int) -> list[str]:
+    sizes = [str(number) for number in (found.states, found.steps, found.depth)]
+    closed, broken = "yes" if found.closed else "no", ", ".join(found.broken) or "none"
+    return [name, *sizes, closed, str(invariants), broken, f"{found.seconds:.1f}"]
+
+
+def explore_guard(wrong: int) -> bool:
+    rows, whole = [], True
+    for control in CONTROLS:
+        for reaction in REACTIONS:
+            found = explore(GuardWorld(Settings(reaction, control, most_wrong=wrong)), PROGRESS)
+            rows.append(row(f"{reaction}, {control}", found, len(INVARIANTS)))
+            whole = whole and found.closed and not found.broken
+            for way, said in found.broken.values():
+                print(f"{said}\n  after: {', '.join(way)}")
+    things = "one thing" if wrong == 1 else f"{wrong} things"
+    show(f"The guard's core, {things} wrong at once", ["reaction and control", *COLUMNS], rows)
+    return whole
+
+
+def explore_processes() -> bool:
+    rows, needed, whole = [], [], True
+    for control, watchdog in (("internal", 0.25), ("external", math.inf), ("external", 0.25)):
+        name = control + (", with its lines" if control == "external" and watchdog < math.inf else "")
+        parts = {"watchdog": watchdog}
+        found = explore(ProcessWorld(control, Parts(**parts)), PROGRESS)
+        rows.append(row(name, found, len(PROCESS_INVARIANTS)))
+        whole = whole and found.closed and not found.broken
+        for part in PARTS:
+            without = explore(ProcessWorld(control, Parts(**{**parts, part: math.inf})), PROGRESS, stop_at_first=True)
+            needed.append([name, part, ", ".join(without.broken) or "nothing"])
+    show("The four processes", ["control", *COLUMNS], rows)
+    show("What breaks where nobody listens any more", ["control", "without", "breaks"], needed)
+    return whole
+
+
+def break_each() -> bool:
+    from tests.support.exploration.breaks import BREAKS, find
+
+    rows, all_found = [], True
+    for name, change in BREAKS.items():
+        found = find(name)
+        seen = name in found.broken
+        all_found = all_found and seen
+        way = len(found.broken[name][0]) if seen else 0
+        rows.append([name, change.words, "yes" if seen else "NO", str(way), str(found.states), f"{found.seconds:.2f}"])
+    columns = ["invariant", "what was done to the guard", "found", "actions", "states", "seconds"]
+    show("Each invariant broken on purpose", columns, rows)
+    return all_found
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--wrong", type=int, default=1, help="things that may be wrong at once")
+    parser.add_argument("--compiled", action="store_true", help="explore build/compiled")
+    options = parser.parse_args()
+    compiled = ROOT / "build" / "compiled"
+    if options.compiled and str(compiled) not in os.environ.get("PYTHONPATH", ""):
+        paths = os.pathsep.join([str(compiled), str(ROOT)])
+        words = [sys.executable, "-m", "bench", "exploration", "--compiled", "--wrong", str(options.wrong)]
+        return subprocess.run(words, cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, check=False).returncode
+    print(head())
+    whole = explore_guard(options.wrong)
+    if not options.compiled:
+        whole = explore_processes() & break_each() & whole
+    return 0 if whole else 1

@@ -1,0 +1,95 @@
+"""Age of a controller's states: which of them are new ones, when they were measured, and how late they come. Pure.
+
+One definition for all who ask: for silence, for lag, and for the stop that is judged by measured speeds. A state is a
+fresh one where its own time differs from that of the state before. So a controller that freezes, or a reader that
+repeats itself, is silent. One whose clock is set, back or ahead, is not: its clock has stepped, which is told once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from coneskin.robot.driver.values import ControllerState
+
+__all__ = ["StateAge"]
+
+_OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
+_MAX_STEP_AHEAD: Final = 0.25  # s by which a state may gain on the host's clock; more is no queue that is read out
+_MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
+_LAG_TIME: Final = 0.02  # s for which they must be as late
+
+
+class StateAge:
+    """Age of the states of one controller: whether they stay away, repeat themselves, or come later than they may.
+
+    A queue in the network that fills lets states come later and later, and no time between two of them is long. A host
+    that was held up reads many late ones at once and then the newest, which is none.
+
+    A state is read late when the host is busy, never early. So the smallest difference of the two clocks over some
+    seconds is the true one but for the quickest path through the network (0.1 to 0.3 ms). Drift has no time to show.
+
+    Args:
+        limit: longest age of the newest state [s].
+
+    Attributes:
+        fresh: True where the newest state was a new one.
+        fresh_at: host time of the newest one that was [s].
+        stepped: by how much the controller's clock had stepped before that state, ahead or back [s]. 0 where not.
+    """
+
+    def __init__(self, limit: float) -> None:
+        self.fresh = False
+        self.stepped = 0.0
+        self._limit = limit
+        self._controller_time = -math.inf  # of the newest state
+        self._before = self._now = math.inf  # smallest differences of the clocks in the last window and in this one [s]
+        self._since = -math.inf  # controller's time at which this window began
+        self.fresh_at = -math.inf
+        self._late_since = self._very_late_since = math.inf  # host times of the first state that came so late
+
+    def feed(self, state: ControllerState) -> float:
+        """Take a state that was just read, and return the host time at which it was measured [s], never a later one."""
+        host, controller, last = state.time, state.controller_time, self._controller_time
+        difference = host - controller
+        self.fresh, self.stepped = controller != last, 0.0
+        if controller < last:
+            self.stepped = controller - last
+        elif (gained := min(self._now, self._before) - difference) > _MAX_STEP_AHEAD and gained < math.inf:
+            self.stepped = gained
+        if self.stepped:
+            self._before = self._now = math.inf
+            self._since = controller
+        elif controller - self._since > _OFFSET_WINDOW:
+            self._before, self._now, self._since = self._now, math.inf, controller
+        self._controller_time = controller
+        if difference < self._now:
+            self._now = difference
+        smallest = self._now if self._now < self._before else self._before
+        measured_at = min(controller + smallest, host)
+        if self.fresh:
+            self.fresh_at = host
+            lag = host - measured_at
+            self._late_since = min(self._late_since, host) if lag > _MAX_SUPERVISION_LAG else math.inf
+            self._very_late_since = min(self._very_late_since, host) if lag > self._limit else math.inf
+        return measured_at
+
+    def silent(self, now: float, limit: float = 0.0) -> bool:
+        """Tell whether the newest fresh state is too old at a host time [s], older than a limit that may be longer."""
+        return now - self.fresh_at > max(limit, self._limit)
+
+    def trouble(self, now: float) -> str:
+        """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
+        if self.silent(now):
+            return f"the controller has sent no state for {1e3 * self._limit:g} ms"
+        if now - self._very_late_since > self._limit:
+            causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
+            return f"the controller's states come more than {1e3 * self._limit:g} ms late: {causes}"
+        return ""
+
+    def stale(self, now: float) -> str:
+        """Return why they cannot supervise a motion away at a host time [s]. Empty where they can."""
+        if now - self._late_since <= _LAG_TIME:
+            return ""
+        limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"
+        return f"the controller's states come more than {limit} late, too late to move away by"

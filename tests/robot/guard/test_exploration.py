@@ -1,0 +1,74 @@
+"""The guard's core, explored to the end of its states, and what the explorer finds in a guard that is broken."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from coneskin.runs.replay.run import read_run
+from tests.support.exploration.breaks import BREAKS, broken, find
+from tests.support.exploration.explorer import explore, follow
+from tests.support.exploration.guard_world import INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
+from tests.support.exploration.process_world import Parts, ProcessWorld
+
+#: CI's share; `python -m bench exploration` explores every reaction with each control
+_EXPLORED = [("stop", "internal"), ("retreat", "internal")]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("reaction", "control"), _EXPLORED)
+def test_no_invariant_breaks_in_any_state(reaction: str, control: str) -> None:
+    found = explore(GuardWorld(Settings(reaction, control)), PROGRESS)
+    assert found.broken == {}
+    assert found.closed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("reaction", "control"), [*((kind, "internal") for kind in REACTIONS), ("stop", "external")])
+def test_a_touch_of_either_sensor_is_answered_and_latched_and_forgiven(reaction: str, control: str) -> None:
+    touches = frozenset({"wait", "wait for a change", "a program moves", "unlock", "reset"})
+    found = explore(
+        GuardWorld(
+            Settings(reaction, control, sensors=2), only=touches | {"touch one", "mend one", "touch two", "mend two"}
+        ),
+        PROGRESS,
+    )
+    assert found.broken == {}
+    assert found.closed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("control", ["internal", "external"])
+def test_no_silence_of_a_process_is_left_alone(control: str) -> None:
+    watchdog = Parts().watchdog if control == "internal" else math.inf  # by default its program heeds no guard
+    found = explore(ProcessWorld(control, Parts(watchdog=watchdog)), PROGRESS)
+    assert found.broken == {}
+    assert found.closed
+
+
+@pytest.mark.parametrize(
+    ("control", "part"),
+    [("internal", "program_silence"), ("internal", "watchdog"), ("external", "process_silence")],
+)
+def test_without_one_who_listens_the_arm_moves_on(control: str, part: str) -> None:
+    found = explore(ProcessWorld(control, Parts(**{part: math.inf})), stop_at_first=True)
+    assert found.broken
+
+
+@pytest.mark.pure
+@pytest.mark.parametrize("name", INVARIANTS)
+def test_each_invariant_that_is_broken_on_purpose_is_found(name: str) -> None:
+    assert name in BREAKS
+    assert name in find(name).broken
+
+
+@pytest.mark.pure
+def test_a_way_to_a_broken_invariant_is_a_recording_that_replays(tmp_path: Path) -> None:
+    way, said = find("still").broken["still"]
+    with broken("still"):
+        world = GuardWorld(Settings(), recorded=True)
+        assert said in follow(world, way)
+        world.write(tmp_path / "way.rec")
+        again = read_run(tmp_path / "way.rec").replay()
+    assert again.same
+    assert "latched" in [event.name for event in again.events]

@@ -1,0 +1,131 @@
+"""Explorer of a world: breadth first over abstract states, until there is no new one. It knows no guard.
+
+A world can be copied, has an abstract state (``key``), and takes actions by their names. After each action it says
+which written invariants it has broken. What holds in the long run is read off the graph at the end: from every state a
+helpful way leads to a state that is wanted.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Hashable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, Self
+
+__all__ = ["Exploration", "World", "explore"]
+
+
+class World(Protocol):
+    """What an explorer needs of a world."""
+
+    def copy(self) -> Self:
+        """Return a world that goes on alone from here."""
+
+    def key(self) -> Hashable:
+        """Return the abstract state."""
+
+    def actions(self) -> Sequence[str]:
+        """Return what may happen next, the helpful actions included."""
+
+    def helps(self, action: str) -> bool:
+        """Tell whether a person who helps would do this."""
+
+    def act(self, action: str) -> list[str]:
+        """Let it happen, and return the invariants that are broken, one line each that begins with its name."""
+
+    @property
+    def wanted(self) -> bool:
+        """True in a state to which every way has to lead back."""
+
+
+@dataclass(frozen=True)
+class Exploration:
+    """What was found.
+
+    Attributes:
+        states: abstract states.
+        steps: actions tried.
+        depth: actions from the start to the farthest state.
+        closed: True where no new state was left to go on from.
+        seconds: that it took, of the processor.
+        broken: invariant -> the shortest way on which it broke, and what was said.
+        by_action: how often each action led to a new state.
+    """
+
+    states: int
+    steps: int
+    depth: int
+    closed: bool
+    seconds: float
+    broken: dict[str, tuple[tuple[str, ...], str]] = field(default_factory=dict)
+    by_action: dict[str, int] = field(default_factory=dict)
+
+
+def explore(start: World, progress: str = "", most_states: int = 1_000_000, stop_at_first: bool = False) -> Exploration:
+    """Explore a world to the end.
+
+    Args:
+        start: its first state.
+        progress: name of the invariant that a helpful way leads from every state to a wanted one. Empty for none.
+        most_states: after which to give up.
+        stop_at_first: end with the first broken invariant.
+    """
+    began = time.process_time()
+    first = start.key()
+    ways: dict[Hashable, tuple[Hashable | None, str, int]] = {first: (None, "", 0)}
+    back: dict[Hashable, list[Hashable]] = {first: []}
+    wanted = {first} if start.wanted else set()
+    broken: dict[str, tuple[tuple[str, ...], str]] = {}
+    unsound: set[Hashable] = set()  # reached by a broken invariant: nothing after it counts
+    queue: deque[tuple[Hashable, World]] = deque([(first, start)])
+    fresh: Counter[str] = Counter()
+    steps = depth = 0
+    while queue and len(ways) < most_states and not (stop_at_first and broken):
+        here, world = queue.popleft()
+        for action in world.actions():
+            steps += 1
+            then = world.copy()
+            wrong = then.act(action)
+            for line in wrong:
+                broken.setdefault(line.partition(":")[0], ((*_way(ways, here), action), line))
+            if wrong:
+                continue
+            key = then.key()
+            if key not in ways:
+                ways[key] = here, action, ways[here][2] + 1
+                depth = max(depth, ways[key][2])
+                back[key] = []
+                fresh[action] += 1
+                queue.append((key, then))
+                if then.wanted:
+                    wanted.add(key)
+            if world.helps(action):
+                back[key].append(here)
+    closed = not queue
+    if progress and closed:
+        reached, todo = set(wanted), list(wanted)
+        while todo:
+            for before in back[todo.pop()]:
+                if before not in reached:
+                    reached.add(before)
+                    todo.append(before)
+        stuck = [key for key in ways if key not in reached and key not in unsound]
+        if stuck:
+            shortest = min(stuck, key=lambda key: ways[key][2])
+            broken[progress] = (_way(ways, shortest), f"{progress}: {len(stuck)} states lead no way back")
+    return Exploration(len(ways), steps, depth, closed, time.process_time() - began, broken, dict(fresh))
+
+
+def _way(ways: dict[Hashable, tuple[Hashable | None, str, int]], key: Hashable) -> tuple[str, ...]:
+    found: list[str] = []
+    at: Hashable | None = key
+    while at is not None and (step := ways[at])[0] is not None:
+        found.append(step[1])
+        at = step[0]
+    return tuple(reversed(found))
+
+
+def follow(world: World, way: Iterable[str]) -> list[str]:
+    """Let a way happen, and return the invariants that break on it."""
+    return [line for action in way for line in world.act(action)]

@@ -1,0 +1,246 @@
+"""World of the four processes: program, guard, driver process or guard watchdog, and the controller.
+
+A model of its own that shares no code with them, only their limits. Each process may crash, freeze and go on, each beat
+may be lost, the network may be cut, the skin may be touched. What each does about it is written down here as the pages
+have it (docs/safety.md, P39 to P54). So this shows that the limits fit together, and that no silence is left alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, replace
+
+from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
+from coneskin.robot.stop.limits import MonitoringLimits
+
+__all__ = ["PROCESS_INVARIANTS", "Parts", "ProcessWorld"]
+
+_TICK = 0.05  # s; no limit is finer
+_MOST_WRONG = 2  # processes or lines at once, beside lost beats
+_MOST_LOST = 2  # beats of one line in a row that may be lost while nobody needs to stop
+_SESSION_TIMEOUT = 1.0  # s
+_STOP_TICKS = 1  # in which an arm that was told to has stopped
+
+
+_LONGEST = 30  # ticks; longer than every limit
+
+
+def _ticks(seconds: float) -> int:
+    return _LONGEST if seconds == math.inf else math.ceil(seconds / _TICK - 1e-9)
+
+
+def _aged(age: int, limit: int, moves: bool) -> int:
+    """Return the next age: no larger than it matters, and only whether it is too large where nothing moves."""
+    return min(age + 1, limit + 1) if moves else limit + 1
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What there is to miss each other; one taken away shows what it is for.
+
+    Attributes:
+        program_silence, process_silence, guard_silence: longest silences [s]; infinite where nobody listens.
+        session_silence: after which the program's own process holds the arm, with external control [s].
+        watchdog: after which the controller ends a program that hears nothing [s]: with internal control that of the
+            driver process, with external control one with the lines of ``coneskin heartbeat``.
+    """
+
+    program_silence: float = MonitoringLimits().program_silence
+    process_silence: float = MonitoringLimits().process_silence
+    guard_silence: float = HEARTBEAT_TIMEOUT
+    session_silence: float = _SESSION_TIMEOUT
+    watchdog: float = 0.25
+
+
+#: name -> what has to hold
+PROCESS_INVARIANTS = {
+    "touched": "A touch under a guard that lives stops the arm in the same tick.",
+    "unguarded": "An arm without a guard that lives moves no longer than the first who misses it needs.",
+    "frozen": "An arm whose program, driver process or watchdog is gone moves no longer than its limit.",
+    "cut": "An arm behind a cut network moves no longer than the controller's watchdog, where its program heeds that.",
+    "patient": "Up to two beats in a row that are lost stop nothing.",
+    "released": "An arm moves again only after a reset, while guard and helper live.",
+    "back to active": "From every state a person who starts again what is gone gets back to active.",
+}
+
+_ALIVE, _FROZEN, _DEAD = "alive", "frozen", "dead"
+
+
+@dataclass(frozen=True)
+class _State:
+    """All of it. Ages are in ticks since the last beat was heard; what is not listened to has the age 0."""
+
+    program: str = _ALIVE
+    guard: str = _ALIVE
+    helper: str = _ALIVE
+    cut: bool = False
+    moves: bool = True
+    latched: bool = False
+    touched: bool = False
+    program_age: int = 0  # as the guard hears it
+    helper_age: int = 0
+    guard_age: int = 0  # as the helper hears it
+    session_age: int = 0  # as the program hears the guard
+    kick_age: int = 0  # as the controller hears the driver process, or the guard's count
+    wrong_for: int = 0  # ticks that the arm has moved since the newest thing went wrong
+    lost: int = 0  # beats in a row that were lost
+
+
+class ProcessWorld:
+    """The world.
+
+    Args:
+        control: "internal" or "external".
+        parts: who listens to whom, and for how long.
+    """
+
+    def __init__(self, control: str, parts: Parts = Parts(), state: _State = _State()) -> None:
+        self.control, self.parts, self.state = control, parts, state
+
+    def copy(self) -> ProcessWorld:
+        return ProcessWorld(self.control, self.parts, self.state)
+
+    def key(self) -> Hashable:
+        return self.state
+
+    @property
+    def wanted(self) -> bool:
+        state = self.state
+        return state.moves and not state.latched and not self._wrong()
+
+    def helps(self, action: str) -> bool:
+        return action in ("tick", "reset", "free", "mend the network") or action.startswith(("thaw", "restart"))
+
+    def _wrong(self) -> int:
+        state = self.state
+        return sum(one != _ALIVE for one in (state.program, state.guard, state.helper)) + state.cut
+
+    def actions(self) -> Sequence[str]:
+        state, found = self.state, ["tick"]
+        more = self._wrong() < _MOST_WRONG
+        for name in ("program", "guard", "helper"):
+            how = getattr(state, name)
+            found += [f"thaw {name}"] if how == _FROZEN else []
+            found += [f"freeze {name}", f"kill {name}"] if how == _ALIVE and more else []
+        found += ["restart"] if _DEAD in (state.program, state.guard, state.helper) else []
+        found += ["mend the network"] if state.cut else ["cut the network"] if more else []
+        found += ["free"] if state.touched else ["touch"]
+        found += ["reset"] if state.latched else []
+        found += ["lose a beat"] if state.lost < _MOST_LOST and state.moves and not self._wrong() else []
+        return found
+
+    def act(self, action: str) -> list[str]:
+        before, broken = self.state, list[str]()
+        match action.split():
+            case ["freeze", name]:
+                self.state = replace(before, **{name: _FROZEN}, wrong_for=0)
+            case ["kill", name]:
+                self.state = replace(before, **{name: _DEAD}, wrong_for=0)
+            case ["thaw", name]:
+                self.state = replace(before, **{name: _ALIVE}, wrong_for=0)
+            case ["restart"]:  # the program ends, its processes with it, and a new one begins with a guard that waits
+                self.state = _State(moves=False, latched=True, cut=before.cut, touched=before.touched)
+            case ["cut", *_] | ["mend", *_]:
+                self.state = replace(before, cut=not before.cut, wrong_for=0)
+            case ["touch"] | ["free"]:
+                self.state = replace(before, touched=action == "touch")
+            case ["reset"]:
+                self._reset()
+            case ["tick"] | ["lose", *_]:
+                broken = self._tick(lost=action != "tick")
+        return broken
+
+    def _reset(self) -> None:
+        """Forgive a stop: the guard lives, nothing stands against it, and the helper acknowledges."""
+        state = self.state
+        parts, heard = self.parts, not state.cut
+        fine = state.program_age <= _ticks(parts.program_silence) and state.helper_age <= _ticks(parts.process_silence)
+        lives = state.program == state.guard == state.helper == _ALIVE
+        if lives and fine and heard and not state.touched:
+            self.state = replace(state, latched=False, moves=True, wrong_for=0)
+
+    def _tick(self, lost: bool) -> list[str]:
+        """Let a tick pass: beats, what each notices, and what comes of it."""
+        state, parts, internal = self.state, self.parts, self.control == "internal"
+        guard, helper, program = state.guard == _ALIVE, state.helper == _ALIVE, state.program == _ALIVE
+        hears = {
+            "program_age": (program and guard and not lost, parts.program_silence),
+            "helper_age": (helper and guard and not lost, parts.process_silence),
+            "guard_age": (guard and helper and not lost, parts.guard_silence),
+            "session_age": ((guard and program and not lost) or internal, parts.session_silence),
+            "kick_age": ((helper if internal else guard) and not state.cut, parts.watchdog),
+        }
+        age = {
+            name: 0 if hears_it else _aged(getattr(state, name), _ticks(limit), state.moves)
+            for name, (hears_it, limit) in hears.items()
+        }
+        # one that was frozen reads what has waited before it judges: its own time was nobody's silence
+        stop = latch = False
+        reaches = not state.cut
+        if guard:
+            silent = age["program_age"] > _ticks(parts.program_silence)
+            silent |= age["helper_age"] > _ticks(parts.process_silence)
+            gone = _DEAD in (state.program, state.helper)  # their channels have ended
+            states_silent = state.cut
+            if state.touched or silent or gone or states_silent:
+                stop, latch = reaches, True
+        if helper:
+            if age["guard_age"] > _ticks(parts.guard_silence) or (
+                state.guard == _DEAD and parts.guard_silence < math.inf
+            ):
+                stop = stop or reaches
+            stop |= reaches and internal and state.program == _DEAD
+        if program and not internal:
+            ended = state.guard == _DEAD and parts.session_silence < math.inf
+            stop |= reaches and (ended or age["session_age"] > _ticks(parts.session_silence))
+        if age["kick_age"] > _ticks(parts.watchdog):
+            stop = True
+        moves = state.moves and not stop
+        # internal: a driver process that is gone can start nothing, but what runs goes on until the watchdog ends it
+        wrong = self._wrong() > 0
+        wrong_for = min(_LONGEST, state.wrong_for + 1) if wrong and moves else 0
+        self.state = replace(
+            state,
+            **age,  # type: ignore[arg-type]
+            moves=moves,
+            latched=state.latched or latch or (state.moves and not moves),
+            wrong_for=wrong_for,
+            lost=state.lost + 1 if lost and moves else 0,
+        )
+        return self._judge(state, lost)
+
+    @property
+    def _heeds(self) -> bool:
+        """True where the program on the controller is meant to end by itself."""
+        return self.control == "internal" or self.parts.watchdog < math.inf
+
+    def _judge(self, before: _State, lost: bool) -> list[str]:
+        state, internal, broken = self.state, self.control == "internal", []
+        alive = {name for name in ("program", "guard", "helper") if getattr(state, name) == _ALIVE}
+        if state.moves and state.touched and "guard" in alive and not state.cut:
+            broken.append("touched: it moves on")
+        if state.moves and before.latched and not before.moves:
+            broken.append("released: it moves without a reset")
+        longest = state.wrong_for
+        if state.cut and self._heeds and longest > _ticks(0.25) + _STOP_TICKS:
+            broken.append(f"cut: it moves for {longest * _TICK:.2f} s")
+        elif state.cut:
+            pass  # nothing reaches the controller, and its program does not heed that: said in docs/safety.md
+        elif "guard" not in alive:
+            limits = [0.5] if "helper" in alive else []
+            limits += [1.0] if "program" in alive and not internal else []
+            if self.parts.watchdog < math.inf and (not internal or "helper" not in alive):
+                limits.append(0.25)  # the controller's own
+            if limits and longest > _ticks(min(limits)) + _STOP_TICKS:
+                broken.append(f"unguarded: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
+        elif alive != {"program", "guard", "helper"} and longest > _ticks(0.2) + _STOP_TICKS:
+            broken.append(f"frozen: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
+        if before.moves and not state.moves and not (self._wrong() or state.touched or _were_wrong(before)):
+            broken.append("patient: it is stopped although nothing is wrong")
+        return broken
+
+
+def _were_wrong(state: _State) -> bool:
+    """Tell whether an age tells of something that was wrong a moment ago."""
+    return max(state.program_age, state.helper_age, state.guard_age, state.session_age, state.kick_age) > _MOST_LOST
