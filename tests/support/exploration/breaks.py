@@ -12,14 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
 
-from coneskin.robot.guard.motion.reaction_motion import ReactionPlanner
-
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard.activation import Activation, ActivationStep
 from coneskin.robot.guard.arm_stop import ArmStop
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
+from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import EventName, emit
 from coneskin.robot.stop.standstill import StandstillWatch
