@@ -245,7 +245,7 @@ class UrArm:
         # one cycle: without a time URScript's speedj returns when the speed is reached, and takes no new target before
         self._start(kind, Mode.SPEED, list(target), acceleration, 0.002)
 
-    def servo(self, kind: str, target: Sequence[float], lookahead: float = 0.1, gain: float = 300.0) -> None:
+    def servo(self, kind: str, target: Sequence[float], lookahead: float, gain: float) -> None:
         """Follow joint positions [rad] ("servo_j") or poses of the tool ("servo_l"), one each control cycle.
 
         Raises:

@@ -61,3 +61,9 @@ def test_what_is_given_is_kept():
 def test_electronics_that_are_given_to_a_sensor_are_its_own():
     assert Sensor(Frustum(0.054, 0.054, 0.434), electronics=Electronics()).electronics.current_full_scale == 0.02
     assert Sensor(Frustum(0.054, 0.054, 0.434)).electronics.current_full_scale < 0.008
+
+
+def test_the_highest_count_is_the_range_of_the_converter():
+    parts = Electronics()
+    assert (parts.volts(4095), parts.volts(0)) == (3.3, 0.0)
+    assert (parts.amperes(4095), parts.amperes(0)) == (0.02, 0.0)

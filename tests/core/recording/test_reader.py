@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording import reader
-from coneskin.core.recording.block import Block
+from coneskin.core.recording.block import Block, is_time
 from coneskin.core.recording.chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, encode_chunk
 from coneskin.core.recording.defects import DefectKind
 from coneskin.core.recording.reader import Recording, read_recording
@@ -236,3 +236,9 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
         path.write_bytes(data)
         with pytest.raises(RecordingError, match=words):
             read_recording(path)
+
+
+def test_a_time_is_a_number_that_a_clock_can_show() -> None:
+    assert is_time(0)
+    assert is_time(-1.5)
+    assert not any(map(is_time, (True, None, "1", 1e13, float("nan"), float("inf"))))

@@ -7,6 +7,7 @@ from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop import backup_stop as module
 from coneskin.robot.stop.backup_stop import BackupStop, StandstillHold
 from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.driver import UR_DRIVER
 from coneskin.robot.ur.rtde_codec import STATE_RECIPE
 
@@ -88,6 +89,17 @@ def test_the_first_stop_is_out_before_anything_else_and_one_is_enough(world):
     assert [(path, a) for _, path, a in world.used] == [(StopPath.PROGRAM, 10.0)]
     assert stopper(world).stop(4.0) is True
     assert world.used[-1][2] == 4.0
+
+
+@pytest.mark.parametrize(("talks", "speed"), [(True, 1.0), (False, None)])
+def test_a_speed_from_before_a_silence_is_not_that_of_the_stop(world, monkeypatch, talks, speed):
+    made = []
+    monkeypatch.setattr(module, "StopMonitor", lambda *given: made.append(given) or StopMonitor(*given))
+    ours = stopper(world)
+    assert ours.stop(over=lambda: world.now > 1.0) is False  # it has seen the arm move
+    world.talks, world.now = talks, world.now + 10.0
+    ours.stop(over=lambda: True)
+    assert made[-1][1] == speed
 
 
 def test_while_the_arm_moves_it_is_not_given_up_and_a_protective_stop_is_left_to_work(world):

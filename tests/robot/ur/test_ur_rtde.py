@@ -20,8 +20,8 @@ from .fake_wheel import arm, stops
         (lambda a: a.move_path([Waypoint.move_j([0.0] * 6)]), "stopJ"),
         (lambda a: a.speed("speed_j", [0.0] * 6, 1.0), "speedStop"),
         (lambda a: a.speed("speed_l", [0.0] * 6, 1.0), "speedStop"),
-        (lambda a: a.servo("servo_j", [0.0] * 6), "servoStop"),
-        (lambda a: a.servo("servo_l", [0.0] * 6), "servoStop"),
+        (lambda a: a.servo("servo_j", [0.0] * 6, 0.1, 300.0), "servoStop"),
+        (lambda a: a.servo("servo_l", [0.0] * 6, 0.1, 300.0), "servoStop"),
     ],
 )
 def test_each_mode_has_its_own_stop(start, stop):
@@ -36,16 +36,16 @@ def test_no_motion_starts_on_a_live_thread_of_another_kind():
     a = arm()
     a.move("move_j", [0.0] * 6, 1.0, 1.0)
     a.speed("speed_j", [0.0] * 6, 1.0)
-    a.servo("servo_j", [0.0] * 6)
+    a.servo("servo_j", [0.0] * 6, 0.1, 300.0)
     a.move("move_l", [0.0] * 6, 1.0, 1.0)
     assert stops(a.control) == ["moveJ", "stopJ", "speedJ", "speedStop", "servoJ", "servoStop", "moveL"]
     a.control.calls.clear()
     a.speed("speed_l", [0.0] * 6, 1.0)
     a.speed("speed_j", [0.0] * 6, 1.0)  # one thread of the wheel's program does both
-    a.servo("servo_l", [0.0] * 6)
+    a.servo("servo_l", [0.0] * 6, 0.1, 300.0)
     a.speed("speed_l", [0.0] * 6, 1.0)
     a.move_path([Waypoint.move_l([0.0] * 6)])
-    a.servo("servo_j", [0.0] * 6)
+    a.servo("servo_j", [0.0] * 6, 0.1, 300.0)
     assert stops(a.control) == [
         *("stopJ", "speedL", "speedJ", "speedStop", "servoL", "servoStop", "speedL", "speedStop"),
         *("movePath", "stopJ", "servoJ"),
@@ -66,7 +66,7 @@ def test_what_the_wheel_refuses_is_an_error():
     [
         lambda a: a.move("move_j", [0.0] * 6, 1.0, 1.0),
         lambda a: a.speed("speed_j", [0.0] * 6, 1.0),
-        lambda a: a.servo("servo_j", [0.0] * 6),
+        lambda a: a.servo("servo_j", [0.0] * 6, 0.1, 300.0),
     ],
 )
 def test_tool_and_payload_are_set_only_while_nothing_moves(start):

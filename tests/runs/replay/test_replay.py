@@ -21,6 +21,7 @@ from coneskin.runs.decisions import decide_again, recorded_decisions
 from coneskin.runs.replay.event_details import event_differences
 from coneskin.runs.replay.run import Run, Verdict, read_run
 from coneskin.scene.settings import resolved_settings
+from coneskin.scene.values.scene import Commissioning
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.sweep import sweep
 
@@ -151,6 +152,15 @@ def test_another_scene_gives_other_events(run: Run) -> None:
     result = run.replay(deaf)
     assert not result.same
     assert "contact" not in [event.name for event in result.events]
+
+
+def test_another_scene_keeps_its_own_commissioning_and_else_has_that_of_the_run(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("coneskin.scene.build.build_core", lambda scene, placed, detector: scene.commissioning)
+    own, bare = Commissioning(False, "its own"), changed(run.scene(), commissioning=None)
+    assert run.build_core(changed(bare, commissioning=own)) == own
+    assert run.build_core(bare) == run.commissioning
 
 
 def test_a_guard_that_could_not_start_replays(tmp_path: Path, run: Run) -> None:

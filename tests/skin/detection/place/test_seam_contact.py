@@ -12,7 +12,7 @@ from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
 from coneskin.skin.detection.place.seam_contact import SeamCertainty, SeamPlace
-from coneskin.skin.detection.place.single_contact import CONTRADICTS, MOVES
+from coneskin.skin.detection.place.single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact
@@ -139,6 +139,14 @@ def test_one_contact_beside_the_seam_is_where_it_is():
         last = readings(sensor, [pressed(0.1, side, 5.0)], field())[-1]
         assert last.location_valid
         assert last.phi == pytest.approx(side, abs=0.01)
+
+
+@pytest.mark.pure  # it looks inside
+def test_what_presses_beyond_the_seam_is_nearer_by_the_gap():
+    sensor = Sensor(Frustum(0.054, 0.054, 0.3, math.radians(340.0)), 1)
+    certainty = SeamCertainty(sensor, DetectorSettings(), PlaceEstimator(sensor), 0.33)
+    angle = certainty._angle * sensor.frustum.wrap  # from the edge; from the middle of the seam 10 deg more
+    assert angle + math.radians(10.0) == pytest.approx(DANGEROUS_ANGLE)
 
 
 def test_a_wrap_that_does_not_close_has_no_seam():
