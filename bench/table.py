@@ -33,6 +33,7 @@ BENCHES = {
         "bench.loop.exploration",
         "States that differ in a time or a number only: of each abstract state one is followed.",
     ),
+    "processes": Bench("bench.loop.processes", "A real controller, which sends as much, and a real port."),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
     "start": Bench("bench.loop.start", "The start of an arm's driver."),
     "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),

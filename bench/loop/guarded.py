@@ -145,7 +145,7 @@ class Guarded:
 
 def make_core(stamps: Stamps) -> Any:
     """Return the guard's core with one sensor, which stamps."""
-    limits = MonitoringLimits(SKIN_TIMEOUT, SKIN_TIMEOUT, 0, SKIN_TIMEOUT, settle=0.01)
+    limits = MonitoringLimits(SKIN_TIMEOUT, SKIN_TIMEOUT, arm_silence=SKIN_TIMEOUT, settle=0.01)
     settings = DetectorSettings(timing=TimingLimits(late=SKIN_TIMEOUT))
     cone = PlacedFrustum(SENSOR.frustum)
     placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))

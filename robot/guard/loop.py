@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import gc
 import json
+import os
+import select
 import selectors
 import time
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, SkinTimeout
@@ -26,6 +29,9 @@ from .controller_heartbeat import heartbeat_count
 from .core import GuardCore
 from .phase import Phase
 from .signals.journal import BlockKind, GuardEvent, Output, encode_loss
+
+if TYPE_CHECKING:
+    from _typeshed import HasFileno
 
 __all__ = [
     "GuardLoop",
@@ -120,6 +126,7 @@ _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody 
 #: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
 _PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
+_REPORT_PERIOD = 0.005  # s between two reports to the session where nothing was decided
 _OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
 _SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
 _FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
@@ -154,11 +161,17 @@ class GuardLoop:
         self._sleepless_clock = sleepless_clock
         self._rounds_at = (clock(), sleepless_clock())  # when the newest round began
         self._selector = selectors.DefaultSelector()
+        self._names: dict[int, str] = {}  # descriptor -> attribute of the ports
+        #: the same set of descriptors, asked without what a selector does around it; None where the system has no epoll
+        self._epoll: Any = None
+        if isinstance(self._selector, getattr(selectors, "EpollSelector", ())):
+            self._epoll = select.epoll.fromfd(os.dup(self._selector.fileno()))
         self._quit = False
         self._fed = False  # anything, in this step
         self._beat = -HEARTBEAT_PERIOD
         self._count = 0  # sent last
         self._out: list[bytes] = []
+        self._report_at = 0.0  # when the session is told next
         self._outbox = _Outbox(ports)
         self._gone: Source | None = None  # the skin's source, where it may be opened again
         self._reopening: SourceReopening | None = None
@@ -178,57 +191,71 @@ class GuardLoop:
                 self.poll(_TICK_PERIOD)
             self._end()
         finally:
+            self._report()
             gc.enable()
             self._close()
 
     def _open(self) -> None:
         ports = self._ports
-        for item in (ports.session, ports.driver, ports.watchdog, ports.reader, ports.slider, ports.heartbeat):
-            if item is not None:
-                self._selector.register(item, selectors.EVENT_READ)
+        for name in ("session", "driver", "watchdog", "reader", "slider", "heartbeat"):
+            if (item := getattr(ports, name)) is not None:
+                self._watch(item, name)
         if ports.source is not None:
             self._watch_skin(ports.source)
         for sock in ports.stops.sockets().values() if ports.stops else ():
-            self._selector.register(sock, selectors.EVENT_READ, "stops")
+            self._watch(sock, "stops")
         for what, why in ports.absent.items():
             self._feed(BlockKind.ABSENT, encode_loss(what, why))
 
     def _watch_skin(self, source: Source) -> None:
         if (descriptor := source.fileno()) is not None:
-            self._selector.register(descriptor, selectors.EVENT_READ, "skin")
+            self._watch(descriptor, "skin")
+
+    def _watch(self, fileobj: int | HasFileno, name: str) -> None:
+        self._names[self._selector.register(fileobj, selectors.EVENT_READ).fd] = name
+
+    def _wait(self, timeout: float) -> set[str]:
+        """Wait for input, or for the timeout [s], and return the names of what can be read."""
+        names = self._names
+        if self._epoll is None:
+            return {names[key.fd] for key, _ in self._selector.select(timeout)}
+        return {names[descriptor] for descriptor, _ in self._epoll.poll(timeout)}
 
     def _close(self) -> None:
         if self._reopening is not None:
             self._reopening.stop()
+        if self._epoll is not None:
+            self._epoll.close()
         self._selector.close()
 
     def poll(self, timeout: float) -> None:
         """Wait for input, or for the timeout [s], and serve it."""
-        ports = self._ports
-        ready = {key.data or key.fileobj for key, _ in self._selector.select(timeout)}
+        ports, ready = self._ports, self._wait(timeout)
         self._note_overrun()
         arm_first = self._core.phase.stopping  # states that wait may show that the stop under way works
-        if arm_first:
-            self._read(ports.reader, ready, "controller", BlockKind.ARM)
+        if arm_first and "reader" in ready:
+            self._read(ports.reader, "controller", BlockKind.ARM)
         if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
             self._read_skin(ports.source)
         if self._gone is not None and self._core.phase is Phase.LATCHED:
             self._open_skin_again(self._gone)
-        for channel in (ports.driver, ports.watchdog):  # before the states: they show what was announced here
-            if channel is not None and channel in ready:
+        for name, channel in (("driver", ports.driver), ("watchdog", ports.watchdog)):
+            if channel is not None and name in ready:  # before the states: they show what was announced here
                 self._read_channel(channel)
-        if not arm_first:
-            self._read(ports.reader, ready, "controller", BlockKind.ARM)
-        self._read(ports.slider, ready, "slider", BlockKind.SLIDER)
+        if not arm_first and "reader" in ready:
+            self._read(ports.reader, "controller", BlockKind.ARM)
+        if "slider" in ready:
+            self._read(ports.slider, "slider", BlockKind.SLIDER)
         if ports.heartbeat is not None and (count := heartbeat_count(self._clock())) != self._count:
             self._count = count
             ports.heartbeat.write(count)
-        self._read(ports.heartbeat, ready, "heartbeat", BlockKind.ECHO)
+        if "heartbeat" in ready:
+            self._read(ports.heartbeat, "heartbeat", BlockKind.ECHO)
         if self._clock() - self._beat >= HEARTBEAT_PERIOD:
             self._send_heartbeat()
         if "stops" in ready and ports.stops is not None:
             self._drain(ports.stops)
-        if ports.session in ready:
+        if "session" in ready:
             for message in ports.session.receive():
                 if message == _HEARTBEAT_BYTES:
                     self._feed(BlockKind.PROGRAM, b"")
@@ -242,7 +269,8 @@ class GuardLoop:
         if not self._fed:
             self._feed(BlockKind.TICK, b"")
         self._fed = False
-        self._report()
+        if self._clock() >= self._report_at:
+            self._report()
 
     def _note_overrun(self) -> None:
         """Report how late this round is, to the core as well where nobody has guarded meanwhile."""
@@ -254,6 +282,8 @@ class GuardLoop:
             self._feed(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
 
     def _report(self) -> None:
+        """Tell the session what went in and came out: at once where anything was decided, else together with more."""
+        self._report_at = self._clock() + _REPORT_PERIOD
         if self._out:
             self._ports.session.send(b"".join(self._out))
             self._out.clear()
@@ -297,9 +327,9 @@ class GuardLoop:
                 why = f"{source.name} is gone and could not be opened again: start the guard anew"
                 self._feed(BlockKind.LOST, encode_loss("skin", why))
 
-    def _read(self, reader: PayloadReader | None, ready: Set[object], what: str, kind: BlockKind) -> None:
-        """Feed what has come over a connection of the controller, if anything has."""
-        if reader is None or reader not in ready:
+    def _read(self, reader: PayloadReader | None, what: str, kind: BlockKind) -> None:
+        """Feed what has come over a connection of the controller, unless it was lost in this round."""
+        if reader is None:
             return
         try:
             for payload in reader.read():
@@ -322,7 +352,7 @@ class GuardLoop:
         self._core.feed(block, outbox)
         self._record(block)
         if outbox.sent or outbox.events:
-            done = self._clock()
+            done = self._report_at = self._clock()
             for line in outbox.sent:
                 self._record(Block(BlockKind.COMMAND, done, line))
             for event in outbox.events:

@@ -112,6 +112,7 @@ class SerialPort(Source):
             self.low_latency = False  # no such switch here: a pseudo-terminal, a socket, not Linux
         self._descriptor = _descriptor(port)
         if self._descriptor is not None:
+            os.set_blocking(self._descriptor, False)
             self._wait = _waiter(self._descriptor)
 
     def close(self) -> None:
@@ -132,23 +133,21 @@ class SerialPort(Source):
         descriptor = self._descriptor
         if descriptor is None:
             return self._read_by_pyserial(timeout)
-        deadline = time.monotonic() + timeout
-        left = timeout
+        deadline, waited = 0.0, False
         while True:
             try:
-                if self._wait(left):
-                    data = os.read(descriptor, _MAX_READ)
-                    if data:
-                        return data
+                if data := os.read(descriptor, _MAX_READ):  # without waiting: a loop that was woken for it has it here
+                    return data
+                if waited:
                     raise SkinConnectionError(f"{self.name} is gone: the other end closed it")
             except (BlockingIOError, InterruptedError):
-                pass  # another reader, or a signal, was quicker
-            except SkinConnectionError:
-                raise
+                pass  # nothing has come, or another reader, or a signal, was quicker
             except OSError as error:
                 raise SkinConnectionError(f"{self.name} is gone: {error.strerror or error}") from error
-            left = deadline - time.monotonic()
-            if left <= 0.0:
+            now = time.monotonic()
+            deadline = deadline or now + timeout
+            waited = self._wait(deadline - now)
+            if not waited and time.monotonic() >= deadline:
                 raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
 
     def _read_by_pyserial(self, timeout: float) -> bytes:

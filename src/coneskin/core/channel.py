@@ -137,7 +137,15 @@ class Channel:
                     return False
             elif self.overflow is not None and (notice := self.overflow.notice()):
                 self._out += _LENGTH_FIELD.pack(len(notice)) + notice
-        self._out += _LENGTH_FIELD.pack(len(message)) + message
+        data = _LENGTH_FIELD.pack(len(message)) + message
+        if not self._out:  # mostly nothing waits, and nothing needs to be copied
+            try:
+                if (taken := self._sock.send(data)) == len(data):
+                    return True
+                data = data[taken:]
+            except OSError:
+                pass  # it goes the way of what waits, which says what is wrong
+        self._out += data
         return self._flush()
 
     def flush(self) -> bool:
