@@ -133,12 +133,16 @@ def touches() -> dict[str, list[float]]:
     }
 
 
-def child(long: Path, tree: Path) -> dict[str, object]:
-    """Measure a build in a process of its own."""
+def paths(build: str) -> dict[str, str]:
+    """Return the environment of a process that runs this build."""
     before = os.environ.get("PYTHONPATH", "")
-    paths = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tree), str(ROOT), before])}
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([str(TREES[build]), str(ROOT), before])}
+
+
+def child(long: Path, build: str) -> dict[str, object]:
+    """Measure a build in a process of its own."""
     command = [sys.executable, "-m", "bench.loop.compiled", "--child", str(long)]
-    done = subprocess.run(command, env=paths, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(command, env=paths(build), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return json.loads(done.stdout)
 
 
@@ -157,7 +161,7 @@ def main() -> int:
         record_long_run(long, COLLISION, args.seconds)
         for _ in range(args.rounds):
             for build, tree in TREES.items():
-                rounds[build].append(child(long, tree))
+                rounds[build].append(child(long, build))
                 if rounds[build][-1]["build"] != build:
                     parser.error(f"{tree} is not {build}: make build/compiled/done, and make pure for the checkout")
     rows = []

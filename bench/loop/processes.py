@@ -3,8 +3,8 @@
     make build/compiled/done
     python -m bench processes [--seconds 10] [--rounds 3] [--only pure]
 
-A simulated arm stands under guard, with one virtual skin of 1 kHz, and with eight of 250 Hz. Beside each session run, at the same
-time, two bare programs:
+A simulated arm stands under guard, with one virtual skin of 1 kHz, and with eight of 250 Hz. At the same time run
+two bare programs:
 
     bare loop     poll, read and send: it reads frames at 1 kHz and states at 500 Hz, as the guard with one skin does
     bare ur_rtde  one that opens the same connections as the driver process, and then only keeps them
@@ -34,7 +34,7 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.testing.scenes import forearm_scene
 
-from .compiled import TREES
+from .compiled import TREES, paths
 from .far_end import FarEnd
 
 PATIENT_LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500"
@@ -111,7 +111,8 @@ def measure(skins: int, seconds: float) -> dict[str, float]:
         for name, command in bare.items():
             child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
             stack.callback(child.wait)
-            assert child.stdin is not None and child.stdout is not None
+            assert child.stdin is not None
+            assert child.stdout is not None
             stack.callback(child.stdin.close)
             child.stdout.readline()
             pids[name] = child.pid
@@ -136,27 +137,18 @@ def main() -> None:
     for _ in range(args.rounds):
         for skins in map(int, args.skins.split(",")):
             for build in [args.only] if args.only else TREES:
-                paths = [str(TREES[build]), str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")]
                 command = [sys.executable, "-m", "bench.loop.processes", "--child", str(skins), str(args.seconds)]
-                done = subprocess.run(
-                    command,
-                    env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-                    stdout=subprocess.PIPE,
-                    check=True,
-                )
+                done = subprocess.run(command, env=paths(build), stdout=subprocess.PIPE, check=True)
                 shares = json.loads(done.stdout)
                 if shares.pop("build") != build:
                     parser.error(f"{TREES[build]} is not {build}: make build/compiled/done")
                 found.setdefault((skins, build), []).append(shares)
     for skins in sorted({key[0] for key in found}):
         mine = {build: rounds for (number, build), rounds in found.items() if number == skins}
-        rows = [
-            [
-                name,
-                *(f"{of(r[name] for r in rounds):.1f}" for rounds in mine.values() for of in (min, statistics.median)),
-            ]
-            for name in next(iter(mine.values()))[0]
-        ]
+        rows = []
+        for name in next(iter(mine.values()))[0]:
+            shares = [[each[name] for each in rounds] for rounds in mine.values()]
+            rows.append([name, *(f"{of(values):.1f}" for values in shares for of in (min, statistics.median))])
         rows.append(ratio("guard", "bare loop", mine))
         rows.append(ratio("driver", "bare ur_rtde", mine))
         columns = ["", *(f"{build}: {word}" for build in mine for word in ("least", "median"))]

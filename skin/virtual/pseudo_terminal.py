@@ -17,7 +17,9 @@ from .skin import VirtualSkin
 __all__ = ["Pacing", "PseudoTerminal", "open_raw_terminal", "play", "wait_for_reader", "write_all"]
 
 
-_OPENING_TIME = 0.05  # s; pyserial throws away what came while it was opening
+_OPENING_TIME = 0.05  # s; a reader may throw away what came while it was opening, as pyserial does
+_LOOK_PERIOD = 0.005  # s between two looks for a reader
+_PACKET_MODE = (1).to_bytes(4, sys.byteorder)  # of tty_ioctl(2): our end is told when the reader has thrown bytes away
 
 
 class Pacing:
@@ -148,8 +150,11 @@ class PseudoTerminal(Openable):
         self._slave = self._master = None
 
 
-def open_raw_terminal() -> tuple[int, int, str]:
+def open_raw_terminal(awaited: bool = False) -> tuple[int, int, str]:
     """Make a pseudo-terminal that passes every byte as it is.
+
+    Args:
+        awaited: ``wait_for_reader`` is called later on, and a reader may come before that.
 
     Returns:
         descriptors of both ends (the second is kept open so that readers may come and go) and the path of the port.
@@ -162,6 +167,8 @@ def open_raw_terminal() -> tuple[int, int, str]:
             "a virtual serial port needs pseudo-terminals, which Windows does not have; use the skin in memory, or a "
             "pair of ports made by com0com"
         )
+    import fcntl
+    import termios
     import tty
 
     try:
@@ -170,6 +177,8 @@ def open_raw_terminal() -> tuple[int, int, str]:
         raise SkinConnectionError(f"cannot open a pseudo-terminal: {error}") from error
     tty.setraw(slave)  # no echo, no line editing, no flow control by bytes
     os.set_blocking(master, False)
+    if awaited:
+        fcntl.ioctl(master, termios.TIOCPKT, _PACKET_MODE)
     return master, slave, os.ttyname(slave)
 
 
@@ -184,13 +193,24 @@ def wait_for_reader(master: int, path: str, wait: Callable[[float], bool]) -> in
     Returns:
         a descriptor of the other end, so that it stays when the reader goes; None if stopped.
     """
+    import fcntl
+    import termios
+
     poll = select.poll()
-    poll.register(master, 0)
-    while any(event & select.POLLHUP for _, event in poll.poll(0)):  # a pseudo-terminal without a reader
-        if wait(0.005):
+    poll.register(master, select.POLLPRI)
+    fcntl.ioctl(master, termios.TIOCPKT, _PACKET_MODE)
+    left = _OPENING_TIME
+    while left > 0.0:
+        events = next((event for _, event in poll.poll(0)), 0)
+        flushed = events & select.POLLPRI and os.read(master, 1)[0] & termios.TIOCPKT_FLUSHREAD
+        if events & select.POLLHUP:  # a pseudo-terminal without a reader
+            left = _OPENING_TIME
+        elif flushed:
+            break
+        if wait(_LOOK_PERIOD):
             return None
-    if wait(_OPENING_TIME):
-        return None
+        left -= _LOOK_PERIOD
+    fcntl.ioctl(master, termios.TIOCPKT, bytes(4))
     return os.open(path, os.O_RDWR | os.O_NOCTTY)
 
 

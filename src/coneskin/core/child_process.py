@@ -19,14 +19,16 @@ import select
 import signal
 import socket
 import struct
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .channel import Channel
 from .errors import RobotConnectionError
+
+if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to import
+    import subprocess
 
 __all__ = ["Lifeline", "OwnedProcess", "inherit", "shorten_time_slice", "spawn"]
 
@@ -47,6 +49,8 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
     Raises:
         RobotConnectionError: the process cannot be started.
     """
+    import subprocess
+
     command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
     try:
         if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
@@ -106,6 +110,8 @@ class OwnedProcess:
 
     def close(self) -> None:
         """End the process, whatever its state; may be called twice."""
+        import subprocess
+
         process, self._process = self._process, None
         if process is None:
             return

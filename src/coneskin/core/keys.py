@@ -7,7 +7,6 @@ are their columns.
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import math
 import re
@@ -186,6 +185,8 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
 
 
 def _nearest(name: str, known: Mapping[str, Key]) -> str | None:
+    import difflib  # where something is wrong, and not at each start
+
     stem = name.rsplit("_", 1)[0]
     same = [other for other, key in known.items() if key.plain == stem or key.plain == name]
     return next(iter(same or difflib.get_close_matches(name, known, 1, 0.6)), None)

@@ -6,7 +6,6 @@ what-if sets them. Resolved settings tell what another version of the code would
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import tomllib
@@ -206,6 +205,8 @@ def _index(items: list[Any], part: str, where: str, room: bool = False) -> int:
 
 
 def _unknown(what: str, part: str, known: list[str]) -> str:
+    import difflib  # where something is wrong, and not at each start
+
     near = difflib.get_close_matches(part, known, 1, 0.5)
     said = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}" if known else "there is none at all"
     return f"there is no {what} {part}; {said}"

@@ -12,7 +12,6 @@ from coneskin.core.child_process import spawn
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
 if TYPE_CHECKING:
     import socket
@@ -67,6 +66,8 @@ class SkinClient:
 
     def touch(self, u: float, phi: float, force: float, duration: float, sensor: str | int) -> float:
         """Touch the skin now; arguments, result and errors as of ``Session.touch``."""
+        from coneskin.skin.virtual.scripted_touch import ScriptedTouch
+
         touch = ScriptedTouch(0.0, duration, u, phi, force=force, sensor=self._name(sensor))
         request = {"u": u, "phi": phi, "force": force, "duration": duration, "sensor": touch.sensor}
         self.channel.send(encode_json(request))

@@ -61,7 +61,8 @@ def main(arguments: list[str]) -> int:
         return 1
     start = decode_json(hello[0])
     scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
-    master, slave, path = open_raw_terminal()
+    master, slave, path = open_raw_terminal(awaited=True)
+    os.close(slave)
     channel.send(encode_json({"port": path}))  # the guard opens it, and the arm, while the field is loaded here
     skin = virtual_skin(scene, start.get("script", True), bool(presses))
 
@@ -78,7 +79,6 @@ def main(arguments: list[str]) -> int:
                 return True
         return False
 
-    os.close(slave)
     wait_for_reader(master, path, wait)
     began = time.monotonic()
     assert scene.source is not None

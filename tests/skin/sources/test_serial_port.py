@@ -95,3 +95,46 @@ def test_a_pseudo_terminal_has_no_low_latency_switch():
     finally:
         os.close(slave)
         os.close(master)
+
+
+@posix
+@pytest.mark.parametrize("awaited", [False, True])
+@pytest.mark.parametrize("flushes", [False, True])
+def test_a_virtual_skin_waits_until_its_reader_has_thrown_away_what_had_piled_up(awaited, flushes):
+    """Where the reader throws nothing away, for 50 ms; the waits are counted, and take no time."""
+    import termios
+
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, wait_for_reader
+
+    master, slave, path = open_raw_terminal(awaited)
+    os.close(slave)
+    waits, readers = [], []
+
+    def wait(seconds):
+        waits.append(seconds)
+        if len(waits) == 3:
+            readers.append(os.open(path, os.O_RDWR | os.O_NOCTTY))
+        if len(waits) == 5 and flushes:
+            termios.tcflush(readers[0], termios.TCIFLUSH)
+        return False
+
+    kept = wait_for_reader(master, path, wait)
+    try:
+        assert len(waits) == (5 if flushes else 13)
+        os.write(master, b"frame")
+        assert os.read(readers[0], 10) == b"frame"
+    finally:
+        for descriptor in (kept, *readers, master):
+            os.close(descriptor)
+
+
+@posix
+def test_a_reader_that_came_before_it_was_waited_for_is_played_to_at_once():
+    from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, wait_for_reader
+
+    master, slave, path = open_raw_terminal(awaited=True)
+    os.close(slave)
+    with SerialPort(path):
+        kept = wait_for_reader(master, path, lambda _: pytest.fail("it waited"))
+    os.close(kept)
+    os.close(master)

@@ -5,7 +5,6 @@ What a scene does not name is neither imported, started nor computed. ``reader``
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -369,6 +368,8 @@ def sensor_facts(sensor: Sensor) -> dict[str, Any]:
 
 def facts_digest(facts: Any) -> str:
     """Return a hash of facts, with each number rounded, so that those of two machines agree."""
+    import hashlib  # not at each start
+
     return hashlib.sha256(json.dumps(_rounded(facts), sort_keys=True).encode()).hexdigest()
 
 
