@@ -7,7 +7,6 @@ import socket
 from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
 
 from coneskin.core.channel import Channel, pair
 from coneskin.core.recording.block import Block
@@ -31,7 +30,7 @@ from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.serial_port import SerialPort
 
 from .far_end import CLOCK, CYCLE_FRAMES, SENSOR, TOUCHED_FRAMES, FarEnd
-from .stamps import Stamp, Stamps
+from .stamps import Stamp, StampedChannel, StampedPort, Stamps
 
 SKIN_TIMEOUT = 0.5  # s; frames that the machine holds up are no matter here
 RESET_PERIOD = 0.02  # s
@@ -81,31 +80,37 @@ class Guarded:
         """Guard for some time, resetting after each touch."""
         stamps = Stamps()
         with FarEnd(rate_hz) as far, SerialPort(far.path) as port:
-            core = make_core(stamps)
-            (session, recorder), (driver, arm) = ((Channel(a), b) for a, b in (pair(), pair()))
-            ports = GuardPorts(session, stamps.wrap_source(port), States(far.states), stamps.wrap_driver(driver))  # type: ignore[arg-type]
+            stamps.core = core = make_core()
+            (ours, recorder), (end, arm) = pair(), pair()
+            session, driver = Channel(ours), StampedChannel(end)
+            driver.stamps = stamps
+            ports = GuardPorts(session, StampedPort(port, stamps), States(far.states), driver)  # type: ignore[arg-type]
             loop = GuardLoop(core, ports, CLOCK)
             loop._open()
             core.feed(Block(BlockKind.DRIVER, CLOCK(), StatusReport("ready").encode()), [])
-            end, reset_at, spoke = CLOCK() + seconds + 0.5, 0.0, 0.0
+            over, reset_at, spoke, recorded = CLOCK() + seconds + 0.5, 0.0, 0.0, list[bytes]()
             gc.disable()
-            while CLOCK() < end:
+            while CLOCK() < over:
                 loop.poll(0.002)
+                stamps.done()
                 if CLOCK() - spoke > 0.02:
                     spoke = CLOCK()
                     core.feed(Block(BlockKind.PROGRAM, spoke, b""), [])
                     acknowledged = StatusReport("released", str(core._activation.number))
                     core.feed(Block(BlockKind.DRIVER, spoke, acknowledged.encode()), [])
-                drain(recorder)
+                recorded += drain(recorder)
                 drain(arm)
                 if core.phase is Phase.LATCHED and CLOCK() >= reset_at:  # refused until nothing stands against it
                     reset_at = CLOCK() + RESET_PERIOD
                     core.feed(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.stop_number), [])
             gc.enable()
+            loop._report()
             loop._close()
+            recorded += drain(recorder)
             written = far.written()
         for channel in (session, driver, recorder, arm):
             channel.close()
+        stamps.explain(messages(b"".join(recorded)))
         for stamp in stamps.all:
             self._count(stamp, written)
         self._judge(stamps.all)
@@ -143,19 +148,31 @@ class Guarded:
                 self.inactive[seen[0].reason if seen[0].phase is not Phase.ACTIVE else seen[-1].reason] += 1
 
 
-def make_core(stamps: Stamps) -> Any:
-    """Return the guard's core with one sensor, which stamps."""
+def make_core() -> GuardCore:
+    """Return the guard's core with one sensor."""
     limits = MonitoringLimits(SKIN_TIMEOUT, SKIN_TIMEOUT, arm_silence=SKIN_TIMEOUT, settle=0.01)
     settings = DetectorSettings(timing=TimingLimits(late=SKIN_TIMEOUT))
     cone = PlacedFrustum(SENSOR.frustum)
     placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))
     arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, Reaction(kind="stop"), limits, (StopPath.DRIVER,))
-    return stamps.wrap_core(GuardCore(TouchStream([SENSOR], settings), [placed], limits, arm))
+    return GuardCore(TouchStream([SENSOR], settings), [placed], limits, arm)
 
 
-def drain(sock: socket.socket) -> None:
-    """Throw away what has come."""
+def drain(sock: socket.socket) -> list[bytes]:
+    """Return what has come."""
     sock.setblocking(False)
+    found = []
     with suppress(BlockingIOError):
-        while sock.recv(1 << 16):
-            pass
+        while data := sock.recv(1 << 16):
+            found.append(data)
+    return found
+
+
+def messages(data: bytes) -> bytes:
+    """Return the contents of a channel's messages, without their lengths."""
+    found, at = [], 0
+    while at < len(data):
+        length = int.from_bytes(data[at : at + 4], "little")
+        found.append(data[at + 4 : at + 4 + length])
+        at += 4 + length
+    return b"".join(found)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 from coneskin.core.channel import Channel
+from coneskin.core.recording.block import decode_blocks
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.signals.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.wire import FrameDecoder
 
@@ -29,13 +29,13 @@ class Stamp:
         decided: when a stop was decided [s]; 0 without one.
         sent: when it was sent [s].
         why: of that stop.
-        done: when the core was done [s].
+        done: when the loop's round was over [s].
     """
 
     sequences: tuple[int, ...]
     read: float
     phase: Phase
-    reason: str
+    reason: str = ""
     decided: float = 0.0
     sent: float = 0.0
     why: str = ""
@@ -49,76 +49,70 @@ class Stamps:
     Attributes:
         all: in order.
         core: whose phase is noted.
-        reason: why the guard was last stopped or kept from becoming active.
     """
 
     all: list[Stamp] = field(default_factory=list)
     core: GuardCore | None = None
-    reason: str = "it has not been active yet"
     _decoder: FrameDecoder = field(default_factory=FrameDecoder)
 
-    def wrap_core(self, core: GuardCore) -> Any:
-        """Return the core; it stamps when it is done, and notes why the guard stops."""
-        self.core = core
-        return Wrapped(core, "feed", lambda _, __, out: self._stamp_done(out))
-
-    def wrap_source(self, port: SerialPort) -> Any:
-        """Return the port; it stamps when it has read."""
-        return Wrapped(port, "read", lambda data, *_: self._stamp_read(data))
-
-    def wrap_driver(self, channel: Channel) -> Any:
-        """Return the channel; it stamps before and after a stop is sent."""
-        wrapped = Wrapped(channel, "receive", lambda *_: None)
-        wrapped.send = self._sender(channel)  # type: ignore[attr-defined]
-        return wrapped
-
-    def _stamp_read(self, data: bytes) -> None:
+    def read(self, data: bytes) -> None:
+        """Stamp what has just been read."""
         now = CLOCK()
         assert self.core is not None
         frames = self._decoder.feed(data)
-        self.all.append(Stamp(tuple(frame.sequence for frame in frames), now, self.core.phase, self.reason))
+        self.all.append(Stamp(tuple(frame.sequence for frame in frames), now, self.core.phase))
 
-    def _stamp_done(self, out: Any) -> None:
+    def done(self) -> None:
+        """Stamp that a round of the loop is over."""
         if self.all and not self.all[-1].done:
             self.all[-1].done = CLOCK()
-        events: list[GuardEvent] = getattr(out, "events", [])
-        for event in events:
-            what = event.details.get("why") or event.details.get("what") or event.details.get("reasons")
-            if event.name in ("stopping", "fault", "refused", "waiting"):
-                self.reason = without_numbers(str(what))
-            if event.name == "stopping" and self.all and self.all[-1].sent and not self.all[-1].why:
-                self.all[-1].why = without_numbers(str(what))
 
-    def _sender(self, channel: Channel) -> Callable[[bytes], bool]:
-        def send(message: bytes) -> bool:
-            if message[:1] != b"S" or not self.all or self.all[-1].sent:
-                return channel.send(message)
-            self.all[-1].decided = CLOCK()
-            taken = channel.send(message)
-            self.all[-1].sent = CLOCK()
-            return taken
+    def explain(self, recorded: bytes) -> None:
+        """Say why the guard was not active, and why it stopped, from what it has recorded."""
+        events = [decode_event(block) for _, block in decode_blocks(recorded) if block.kind == BlockKind.EVENT]
+        reason, at = "it has not been active yet", 0
+        ends = [stamp.read for stamp in self.all[1:]] + [math.inf]
+        for stamp, end in zip(self.all, ends, strict=True):
+            stamp.reason = reason
+            while at < len(events) and events[at].time < end:
+                event, at = events[at], at + 1
+                what = event.details.get("why") or event.details.get("what") or event.details.get("reasons")
+                if event.name in ("stopping", "fault", "refused", "waiting"):
+                    reason = without_numbers(str(what))
+                if event.name == "stopping" and stamp.sent and not stamp.why:
+                    stamp.why = reason
 
-        return send
+
+class StampedPort:
+    """Port that stamps when it has read."""
+
+    def __init__(self, port: SerialPort, stamps: Stamps) -> None:
+        self._port, self._stamps = port, stamps
+        self.name, self.fileno = port.name, port.fileno
+
+    def read(self, timeout: float) -> bytes:
+        """Read as the port does."""
+        data = self._port.read(timeout)
+        self._stamps.read(data)
+        return data
+
+
+class StampedChannel(Channel):
+    """Channel to the driver process that stamps before and after a stop is sent."""
+
+    stamps: Stamps
+
+    def send(self, message: bytes) -> bool:
+        """Send as a channel does."""
+        stamps = self.stamps.all
+        if message[:1] != b"S" or not stamps or stamps[-1].sent:
+            return super().send(message)
+        stamps[-1].decided = CLOCK()
+        taken = super().send(message)
+        stamps[-1].sent = CLOCK()
+        return taken
 
 
 def without_numbers(text: str) -> str:
     """Return a reason without its numbers in brackets, so that the same ones can be counted."""
     return re.sub(r" \([^)]*\d[^)]*\)", "", text)
-
-
-class Wrapped:
-    """Object with one method whose results and arguments are passed on as well."""
-
-    def __init__(self, inner: Any, name: str, emit: Callable[..., None]) -> None:
-        method = getattr(inner, name)
-
-        def wrapped(*arguments: Any) -> Any:
-            result = method(*arguments)
-            emit(result, *arguments)
-            return result
-
-        self._inner = inner
-        setattr(self, name, wrapped)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._inner, name)

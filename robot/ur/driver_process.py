@@ -145,7 +145,6 @@ def _duration(request: dict[str, Any]) -> float:
 _MOTION_COMMANDS = (StopProgram, EndReaction, SetJointVelocity)
 _START_TIMEOUT = 3.0  # s for the controller to start the control program again
 _MOVE_POLL_PERIOD = 0.005  # s between two looks at a move whose end the program waits for
-_IDLE_POLL_PERIOD = 0.01  # s between two rounds; a message is served at once
 _KICK_PERIOD = 0.02  # s; well within the watchdog's period, and no load for the controller
 
 
@@ -194,7 +193,7 @@ class DriverProcess:
         """Serve until one of the channels ends, or until ``end``; then stop the arm."""
         self._guard.send(StatusReport("ready").encode())
         try:
-            while not self._quit and self.poll(_MOVE_POLL_PERIOD if self._waiting else _IDLE_POLL_PERIOD):
+            while not self._quit and self.poll(self._until_due()):
                 pass
         finally:
             self._on_end()
@@ -203,6 +202,13 @@ class DriverProcess:
     def end(self) -> None:
         """End ``run``. May be called from a signal handler."""
         self._quit = True
+
+    def _until_due(self) -> float:
+        """Return how long nothing but a message needs this process [s]."""
+        if self._waiting:
+            return _MOVE_POLL_PERIOD
+        due = min(self._kicked + _KICK_PERIOD, self._expires, self._heard + self._patience)
+        return max(due - self._clock(), 0.0)
 
     def poll(self, timeout: float) -> bool:
         """Wait for messages [s] and serve them; return False once a channel has ended."""

@@ -1,5 +1,7 @@
 """Driver process on a mocked arm: the guard comes first, and the arm is stopped when either side ends."""
 
+import math
+
 import pytest
 
 from coneskin.robot.driver.messages import (
@@ -202,6 +204,19 @@ def test_the_watchdog_is_kicked(driver):
     served, made, _, _ = driver
     served.poll(0.0)
     assert ("kick",) in made.control.calls
+
+
+def test_it_waits_for_its_next_kick_or_for_what_is_void_sooner(driver, now):
+    served = driver[0]
+    waits = []
+    served.poll = waits.append  # it ends run, because it returns None
+    served._kicked = now[0] - 0.005
+    served.run()
+    served._expires = now[0] + 0.004
+    served.run()
+    served._expires, served._patience, served._heard = math.inf, HEARTBEAT_TIMEOUT, now[0] - HEARTBEAT_TIMEOUT + 0.002
+    served.run()
+    assert waits == pytest.approx([0.015, 0.004, 0.002])
 
 
 def test_a_stop_of_the_program_that_fails_leaves_no_stream_going_on(driver):
