@@ -35,7 +35,7 @@ BENCHES = {
     ),
     "processes": Bench("bench.loop.processes", "A real controller, which sends as much, and a real port."),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
-    "start": Bench("bench.loop.start", "The start of an arm's driver."),
+    "start": Bench("bench.loop.start", "A real controller, and a port of a real skin."),
     "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),
     # the reaction
     "reaction": Bench("bench.reaction.times", _SIMULATED_ARM),
