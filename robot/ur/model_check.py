@@ -49,7 +49,7 @@ def read_pose(host: str, timeout: float = 2.0) -> _ArmPose | None:
     """
     with RtdeConnection(host, timeout) as connection:
         try:
-            recipe = connection.ask_outputs(_POSE_NAMES, 10.0)
+            recipe = connection.ask_outputs(_POSE_NAMES, 125.0)
         except RobotRefused:
             return None
         connection.start()

@@ -292,7 +292,7 @@ class Session:
             self.recording, self._made = new_recording(scene.recording.folder), True
         virtual = scene.source is not None and scene.source.kind == "virtual"
         self._log = EventLog(self.recording, self._take_event if virtual else self._on_event, scene.recording)
-        self._log.open({**start, "resolved": resolved_settings(scene)})
+        self._log.open({**start, "resolved": resolved_settings(scene)} if self.recording is not None else start)
         channel = self._processes.start(scene, start, self._log.note_truth, self.pressed_by)
         if self._processes.skin is not None:
             self._log.physics = self._processes.skin.physics
