@@ -2,6 +2,7 @@
 
 import os
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
@@ -19,6 +20,7 @@ _WITH_PROCESSES = (  # tests that take turns with a few others; below this folde
     *("guarded", "robot/sim/test_command.py", "robot/sim/test_wheel.py", "test_demos.py", "test_measure_controller.py"),
     *("impact/simulation/test_live_plant.py", "robot/ur/test_program_io.py"),
 )
+_OUTCOMES = ("passed", "failed", "error", "xfailed", "xpassed", "skipped")  # as pytest names them
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml
 
 # A slow machine is no failure, so nothing here depends on time; the same examples every time, so nothing on luck.
@@ -69,6 +71,20 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
     if config.option.markexpr == _SHORT:
         lines.append("short run: tests marked long are deselected; `make check` or `pytest -m ''` runs them too")
     return lines
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Add to the file that CONESKIN_TEST_SUMMARY names what became of the tests, and why some were skipped."""
+    path = os.environ.get("CONESKIN_TEST_SUMMARY")
+    if not path or "PYTEST_XDIST_WORKER" in os.environ:  # a worker's are among those of all
+        return
+    stats = terminalreporter.stats
+    words = [f"{len(stats[name])} {name}" for name in _OUTCOMES if stats.get(name)]
+    why = Counter(report.longrepr[2].removeprefix("Skipped: ") for report in stats.get("skipped", ()))
+    lines = [f"{os.environ.get('CONESKIN_TEST_LABEL', 'tests')}: {', '.join(words) or 'none'}"]
+    lines += [f"  {count} skipped: {reason}" for reason, count in why.most_common()]
+    with Path(path).open("a", encoding="utf-8") as file:
+        file.write("\n".join(lines) + "\n")
 
 
 def _children() -> frozenset[str]:
