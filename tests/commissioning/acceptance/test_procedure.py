@@ -65,6 +65,7 @@ def test_a_right_skin_passes() -> None:
     assert done.procedure.passed
     assert done.procedure.cause == ""
     assert done.kinds == ["mark", "passed"] * 5 + ["sensor"]
+    assert done.notices[-1].text == "one has passed"
     (item,) = done.procedure.sensors
     assert [result.attempts for result in item.results] == [1] * 5
     assert all(result.passed and result.distance_mm == 0.0 for result in item.results)
@@ -78,6 +79,7 @@ def test_each_wrong_wiring_fails_with_its_cause(wrong) -> None:
     assert done.procedure.over
     assert not done.procedure.passed
     assert done.procedure.cause == f"one: it reads as if {wrong.cause}"
+    assert done.notices[-1].text == f"one has NOT passed: it reads as if {wrong.cause}"
 
 
 @pytest.mark.parametrize(

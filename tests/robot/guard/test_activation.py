@@ -3,6 +3,7 @@
 import pytest
 
 from coneskin.robot.driver.messages import Release
+from coneskin.robot.guard.activation import Activation, ActivationStep
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.types import Reaction
@@ -38,6 +39,16 @@ def test_it_refuses_to_arm_and_says_why(spoil, reason):
     rig.run(1.2)
     assert rig.core.phase is Phase.STARTING
     assert any(reason in line for line in rig.event("waiting").details["reasons"])
+
+
+def test_only_the_number_of_the_release_that_waits_is_its_acknowledgement():
+    activation = Activation(settle=0.1)
+    assert not activation.acknowledged(activation.number)
+    steps = [activation.poll(0.05 * k, [], []) for k in range(4)]
+    assert steps[2:] == [ActivationStep.RELEASE, ActivationStep.WAIT]
+    assert [activation.acknowledged(number) for number in range(3)] == [False, True, False]
+    assert activation.poll(0.2, ["it is touched"], []) is ActivationStep.WITHDRAW
+    assert not activation.acknowledged(activation.number)
 
 
 def test_reset_needs_a_person_and_a_free_skin():
