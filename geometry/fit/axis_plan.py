@@ -270,8 +270,6 @@ def _full_wraps(
     worth = profile.radius.mean(axis=1) if profile.weight is None else (profile.radius * profile.weight).mean(axis=1)
     for number in range(1, count + 1):
         chosen = choose_intervals(ends, number, rows, worth)
-        if len(chosen) < number:
-            break
         chosen = balance_borders(profile.z, high, low, chosen, rows)
         sides = [fit_side(profile, a, b, 0, len(profile.phi), requirements.tolerance, rise) for a, b in chosen]
         sides = [side for side in sides if side.end - side.first >= rows]

@@ -193,12 +193,14 @@ def test_the_slider_goes_up_again_after_a_while_of_slower_motion_but_not_beyond_
     assert other.arm.slider == pytest.approx(0.7)
 
 
-def test_a_standing_arm_keeps_the_slider_where_it_is() -> None:
-    """Otherwise each start of a program would begin too fast."""
+@pytest.mark.parametrize(("speed", "moves"), [(0.0, False), (0.018, False), (0.025, True)])
+def test_a_standing_arm_keeps_the_slider_where_it_is(speed: float, moves: bool) -> None:
+    """Otherwise each start of a program would begin too fast. Below 0.02 rad/s it stands."""
     loop = Loop().run(1.0, speed=1.0)
     low = loop.arm.slider
-    loop.run(4.0, speed=0.0)
-    assert loop.arm.slider == low
+    loop.run(3.5, speed=speed / low)
+    assert (loop.arm.slider > low) is moves
+    assert loop.why == ""
 
 
 def test_a_slider_that_a_person_puts_up_again_is_put_down_again() -> None:
