@@ -5,10 +5,12 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from coneskin.cli import main
 from coneskin.core.errors import GeometryError
 from coneskin.design.link_design import LinkMesh, design_link
 from coneskin.design.sheets.sheet_design import DesignOptions
@@ -180,6 +182,14 @@ def stl(mesh: Mesh) -> bytes:
     record = np.zeros(len(corners), np.dtype([("n", "<3f4"), ("v", "<9f4"), ("a", "<u2")]))
     record["v"] = corners.reshape(-1, 9)
     return bytes(80) + len(corners).to_bytes(4, "little") + record.tobytes()
+
+
+def test_the_studio_is_served_at_its_port_and_takes_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    server = Mock(side_effect=KeyboardInterrupt)
+    monkeypatch.setattr("coneskin.view.page_server.PageServer", server)
+    assert main(["studio", "link.stl", "--port", "8123"]) == 130
+    server.assert_called_once_with("coneskin studio", port=8123, uploads=True)
 
 
 def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
