@@ -1,12 +1,15 @@
 """Pure and compiled code side by side: the guard's core, a stop, a replay, and the decode of a frame.
 
     make build/compiled/done
-    python -m bench compiled [--seconds 60] [--rounds 5]
+    python -m bench compiled [--seconds 60] [--rounds 5] [--runs FOLDER] [--disturbed 20]
 
 The two take turns, each in a process of its own: `src` is pure Python, `build/compiled` is compiled by mypyc. Inputs
 are a simulated long run, and tests/data/collision.rec for what a touch costs. Times of the core, of reading and of the
 replay are of the processor, the smallest of all rounds. The bare floor is a loop that only checks each frame's
-checksum, and packs a stop for one of them. Ends with 1 where the outputs of the two differ in a bit.
+checksum, and packs a stop for one of them.
+
+Last come the digests of all outputs of both: of every run below tests/data and --runs, of the long run, and of the
+collision with random counts, lost, repeated and damaged frames in it. Ends with 1 where the two differ in a bit.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import argparse
 import hashlib
 import json
 import os
+import random
 import subprocess
 import sys
 import tempfile
@@ -29,16 +33,18 @@ from coneskin.core.recording.block import Block
 from coneskin.core.version import code_build
 from coneskin.robot.driver.messages import StopProgram
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Output
+from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, GuardEvent, Output
 from coneskin.runs.replay.run import read_run
-from coneskin.scene.build import build_core
-from coneskin.skin.wire import FRAME_LENGTH
+from coneskin.runs.run_files import find_recordings
+from coneskin.scene.build import build_core, build_stream
+from coneskin.skin.wire import FRAME_LENGTH, encode, frame_at
 
 ROOT = Path(__file__).parents[2]
 COLLISION = ROOT / "tests" / "data" / "collision.rec"
 TREES = {"pure": ROOT / "src", "compiled": ROOT / "build" / "compiled"}
 STOPS = 10  # runs up to the touch, in a round
 UNTOUCHED_FRAMES = 500  # of the collision's run that are timed before its touch
+DISTURBED_SHARE = 0.02  # of the frames of a disturbed run
 
 
 class Sink(list[Output]):
@@ -86,9 +92,50 @@ def measure(long: Path) -> dict[str, object]:
         "replay, whole run": [processor(lambda: read_run(long).replay())],
         **touches(),
     }
-    digest = hashlib.sha256("\n".join(map(repr, outputs)).encode())
-    digest.update(json.dumps([event.details for event in read_run(COLLISION).replay().events]).encode())
-    return {"build": code_build(), "figures": figures, "outputs": digest.hexdigest()}
+    return {"build": code_build(), "figures": figures}
+
+
+def digests(paths: list[str], disturbed: int) -> dict[str, object]:
+    """Return the digest of all outputs of each run, and of the collision disturbed in so many ways."""
+    found = {}
+    for path in paths:
+        new_core, inputs = inputs_of(Path(path))
+        found[path] = digest(new_core(), inputs)
+    new_core, inputs = inputs_of(COLLISION)
+    for seed in range(disturbed):
+        found[f"disturbed, seed {seed}"] = digest(new_core(), disturb(inputs, random.Random(seed)))
+    return {"build": code_build(), "outputs": found}
+
+
+def digest(core: GuardCore, inputs: list[Block]) -> tuple[int, int, str]:
+    """Return the numbers of inputs and of outputs of a core, and the digest of the outputs."""
+    outputs, said = list[Output](), hashlib.sha256()
+    for block in inputs:
+        core.feed(block, outputs)
+    for output in outputs:
+        said.update(repr(output).encode())
+        if isinstance(output, GuardEvent):
+            said.update(json.dumps(output.details).encode())
+    return len(inputs), len(outputs), said.hexdigest()
+
+
+def disturb(inputs: list[Block], chance: random.Random) -> list[Block]:
+    """Return the inputs with frames that are damaged, lost, or repeated, or that hold other counts."""
+    found = []
+    for block in inputs:
+        frame = frame_at(block.payload) if block.kind == BlockKind.SKIN else None
+        if frame is None or chance.random() > DISTURBED_SHARE:
+            found.append(block)
+            continue
+        kind, at = chance.choice(("damaged", "lost", "repeated", "counts")), chance.randrange(len(block.payload))
+        if kind == "damaged":
+            found.append(block._replace(payload=block.payload[:at] + b"\x55" + block.payload[at + 1 :]))
+        elif kind == "repeated":
+            found += [block, block]
+        elif kind == "counts":
+            name = chance.choice(("touch_c", "touch_d", "radial_c", "angular_b", "radial_current", "angular_current"))
+            found.append(block._replace(payload=encode(frame._replace(**{name: chance.randrange(4096)}))))
+    return found
 
 
 def touches() -> dict[str, list[float]]:
@@ -110,10 +157,11 @@ def touches() -> dict[str, list[float]]:
         StopProgram(1.0).encode()
         floors.append(1e6 * (time.perf_counter() - began))
     frames = [block for block in inputs if block.kind == BlockKind.SKIN and len(block.payload) == FRAME_LENGTH]
+    scene = read_run(COLLISION).scene()
     touch = next(number for number, block in enumerate(frames) if block.time >= inputs[first].time)
     untouched, touched, early = [], [], []
     for _ in range(STOPS):
-        stream = new_core().stream
+        stream = build_stream(scene)
         for number, block in enumerate(frames):
             began = time.perf_counter()
             stream.feed(block.payload, block.time)
@@ -139,9 +187,9 @@ def paths(build: str) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(TREES[build]), str(ROOT), before])}
 
 
-def child(long: Path, build: str) -> dict[str, object]:
-    """Measure a build in a process of its own."""
-    command = [sys.executable, "-m", "bench.loop.compiled", "--child", str(long)]
+def child(build: str, task: str) -> dict[str, object]:
+    """Let a build do a task, of this module's name and in JSON, in a process of its own."""
+    command = [sys.executable, "-m", "bench.loop.compiled", "--child", task]
     done = subprocess.run(command, env=paths(build), cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     return json.loads(done.stdout)
 
@@ -151,6 +199,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0, help="of the long run (default: %(default)s)")
     parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--runs", type=Path, action="append", default=[], help="folder with runs to compare as well")
+    parser.add_argument("--disturbed", type=int, default=20, help="disturbed runs to compare (default: %(default)s)")
     args = parser.parse_args()
     from bench.replay.long_run import record_long_run
 
@@ -161,9 +211,12 @@ def main() -> int:
         record_long_run(long, COLLISION, args.seconds)
         for _ in range(args.rounds):
             for build, tree in TREES.items():
-                rounds[build].append(child(long, build))
+                rounds[build].append(child(build, json.dumps(["measure", str(long)])))
                 if rounds[build][-1]["build"] != build:
                     parser.error(f"{tree} is not {build}: make build/compiled/done, and make pure for the checkout")
+        runs = [*map(str, find_recordings([COLLISION.parent, *args.runs], beside=True)), str(long)]
+        task = json.dumps(["digests", runs, args.disturbed])
+        outputs = {build: child(build, task)["outputs"] for build in TREES}
     rows = []
     for name in rounds["pure"][0]["figures"]:
         values = {b: [v for result in rounds[b] for v in result["figures"][name]] for b in rounds}
@@ -172,10 +225,15 @@ def main() -> int:
         rows.append([f"{name} [{unit}]", *cells, f"{min(values['pure']) / min(values['compiled']):.2f}"])
     columns = ["", "pure: least", "median", "compiled: least", "median", "times faster"]
     show(f"a run of {args.seconds:g} s, and a touch; {args.rounds} rounds", columns, rows)
-    outputs = {str(result["outputs"]) for results in rounds.values() for result in results}
-    print(f"\noutputs of both: {'the same, bit by bit' if len(outputs) == 1 else 'NOT the same'}, {sorted(outputs)[0]}")
-    return len(outputs) - 1
+    replays = [min(v for result in rounds[b] for v in result["figures"]["replay, whole run"]) for b in rounds]
+    rates = ", ".join(f"{build} {args.seconds / took:.0f}" for build, took in zip(rounds, replays, strict=True))
+    print(f"\nreplay, reading included: {rates} times real time")
+    one, other = outputs.values()
+    rows = [[Path(name).name, *map(str, one[name]), "yes" if one[name] == other[name] else "NO"] for name in one]
+    show("outputs of both builds", ["run", "inputs", "outputs", "sha256", "the same"], rows)
+    return int(one != other)
 
 
 if __name__ == "__main__" and sys.argv[1:2] == ["--child"]:
-    print(json.dumps(measure(Path(sys.argv[2]))))
+    task, *values = json.loads(sys.argv[2])
+    print(json.dumps(measure(Path(values[0])) if task == "measure" else digests(*values)))
