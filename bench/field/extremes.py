@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.report import head, quantile
+from bench.report import head, quantile, show
 from coneskin.core.errors import FieldError
 from coneskin.skin.field.disc import Disc, Discs, centre_distance
 from coneskin.skin.field.fourport import Coupling, angular_phase, radial_phase
@@ -31,8 +31,6 @@ from coneskin.skin.field.multipole import solve_discs
 from coneskin.skin.field.sheet import SectorSheet
 from tests.support.field.exact_circuit import exact_volts
 from tests.support.field.rim_solution import solve_rims
-
-from .tables import print_table
 
 ROUNDING_ERROR = 3e-13  # of the supply: what both sides' rounding may leave at these extremes
 
@@ -187,6 +185,6 @@ def main() -> int:
             + [str(row["refused"]), str(row["no reference"])]
             + [f"{1e3 * quantile(times, share):.3g} ms" for share in (0.5, 0.99)]
         )
-    print_table(columns, rows)
+    show("random extreme sensors", columns, rows)
     print(f"{judged} cases judged of {number}; errors above the tolerance without a word: {unflagged}")
     return 1 if unflagged else 0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.report import show
 from tests.support.field.port_solution import PortSolution
 from tests.support.field.problems import Problem
 from tests.support.field.reference import Reference
@@ -44,8 +45,6 @@ def print_work(runs: list[Run]) -> None:
         mine = [r for r in runs if r.problem == problem]
         ours = list(dict.fromkeys(r.solver for r in mine if r.ours))
         peers = list(dict.fromkeys(r.solver for r in mine if not r.ours))
-        print(f"\nProblem '{problem}': time for one contact and both phases to reach an error")
-        print("(peers and ratios: mesh included / mesh given; ratio = fastest peer's time by ours)")
         short = [name.removeprefix("coneskin ") for name in ours]
         head = ["error", *short, *peers, *(f"ratio {name}" for name in short)]
         rows = []
@@ -57,7 +56,8 @@ def print_work(runs: list[Run]) -> None:
                 [f"{target:.0e}", *map(show_time, own), *(f"{show_time(a)} / {show_time(b)}" for a, b in theirs)]
                 + [f"{_ratio(best[0], t)} / {_ratio(best[1], t)}" for t in own]
             )
-        print_table(head, rows)
+        title = f"'{problem}': time for one scene and both phases to reach an error (mesh included / given)"
+        show(title, head, rows)
 
 
 def show_time(seconds: float) -> str:
@@ -70,12 +70,6 @@ def show_time(seconds: float) -> str:
 
 def _ratio(theirs: float, ours: float) -> str:
     return "-" if math.isinf(ours) or math.isinf(theirs) else f"{float(f'{theirs / ours:.2g}'):g}"
-
-
-def print_table(head: list[str], rows: list[list[str]]) -> None:
-    widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
-    for row in [head, ["-" * w for w in widths], *rows]:
-        print("| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |")
 
 
 def family(problem: Problem) -> str:
@@ -105,7 +99,6 @@ def print_agreement(references: list[Reference], solve: Callable[[Problem], Port
                 reference.estimate,
             )
         )
-    print(f"\nAgreement with NGSolve, {title}")
     head = ["family", "sensors", "worst |dV|/U0", "median", "worst |dI|/I", "worst |dY|/Y", "reference's own estimate"]
     rows = []
     for name in sorted(groups, reverse=True):
@@ -114,7 +107,7 @@ def print_agreement(references: list[Reference], solve: Callable[[Problem], Port
             [name, str(len(volts)), f"{volts.max():.1e}", f"{np.median(volts):.1e}", f"{currents.max():.1e}"]
             + [f"{admittances.max():.1e}", f"{estimates.max():.1e}"]
         )
-    print_table(head, rows)
+    show(f"Agreement with NGSolve, {title}", head, rows)
     return max(row[0] for group in groups.values() for row in group)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,7 @@ from coneskin.core.errors import FieldError
 from .disc import Disc, Discs, check_discs
 from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
 from .multipole import FIRST, LADDER, higher, resolution, solve_discs
-from .one_scene import scene_solver
+from .one_scene import SceneSolver, scene_solver
 from .rim import near_apex, solve_rims
 from .sheet import SectorSheet
 
@@ -52,6 +52,7 @@ class FieldModel:
     upper_resistance: float
     lower_resistance: float
     tolerance: float = 1e-12
+    _scenes: SceneSolver = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("upper_resistance", "lower_resistance"):
@@ -60,6 +61,8 @@ class FieldModel:
                 raise FieldError(f"{name} must be positive and finite [ohm per square], got {value!r}")
         if not 1e-15 <= self.tolerance <= 0.1:
             raise FieldError(f"tolerance must be in [1e-15, 0.1] of the supply, got {self.tolerance!r}")
+        given = self.sheet, self.upper_resistance, self.lower_resistance, self.tolerance
+        object.__setattr__(self, "_scenes", scene_solver(*given))
 
     @property
     def contrast(self) -> float:
@@ -75,7 +78,7 @@ class FieldModel:
         if not discs:
             raise FieldError("at least one contact is needed; for no contact give one of conductance 0")
         scene = [(d.u, d.phi, d.radius, d.conductance) for d in discs]
-        return self._one_scene(scene) or self.contacts(*np.array([scene], dtype=np.float64).T.swapaxes(1, 2))
+        return self._scenes.solve(scene) or self.contacts(*np.array([scene], dtype=np.float64).T.swapaxes(1, 2))
 
     def contacts(
         self,
@@ -100,7 +103,7 @@ class FieldModel:
         given = u, phi, radius, conductance
         # A plain number at a time is solved before numpy has read it.
         if (
-            order is None and all(type(v) is float for v in given) and (one := self._one_scene([given]))  # type: ignore[list-item]
+            order is None and all(type(v) is float for v in given) and (one := self._scenes.solve([given]))  # type: ignore[list-item]
         ):
             return one
         arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in given))
@@ -112,13 +115,9 @@ class FieldModel:
             raise FieldError(f"order must be at least 1, got {order}")
         if order is None and shaped[0].shape[0] == 1:
             scene = list(zip(*(a[0].tolist() for a in shaped), strict=True))
-            if (one := self._one_scene(scene)) is not None:
+            if (one := self._scenes.solve(scene)) is not None:
                 return one
         return self._in_groups(Discs(*shaped), order)
-
-    def _one_scene(self, scene: Sequence[tuple[float, float, float, float]]) -> Coupling | None:
-        solver = scene_solver(self.sheet, self.upper_resistance, self.lower_resistance, self.tolerance)
-        return solver.solve(scene)
 
     def admittance(self, coupling: Coupling) -> Floats:
         """Compute Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""

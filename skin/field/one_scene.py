@@ -387,7 +387,7 @@ class SceneSolver:
         ratio = min(max(decay, change / earlier if change < earlier else decay), 0.9)
         rest = (
             (_SAFETY_FACTOR if order > 1 else 2.0 * _SAFETY_FACTOR)
-            * max(change, earlier * decay)
+            * max(change, 0.1 * earlier * decay)
             * ratio
             / (1.0 - ratio)
         )

@@ -48,7 +48,7 @@ def test_a_scene_is_that_of_the_sampled_series(
     """At every corner of the sheet, along it and across: the mirrors, the turns and the pairs in either order."""
     model = FieldModel(sheet, 1000.0, lower)
     scene = [(x * sheet.width, y * sheet.wrap, 0.008, 40.0 * (i + 1)) for i, (x, y) in enumerate(places)]
-    found = model._one_scene(scene)
+    found = model._scenes.solve(scene)
     exact, _ = solve_discs(sheet, 1000.0, lower, Discs(*np.array([scene]).transpose(2, 0, 1)), 24, 80)
     assert found is not None
     assert error_of(model, found, exact) < 1e-12
@@ -63,7 +63,7 @@ def test_the_error_that_is_told_holds_against_finite_elements(tolerance: float) 
         if not problem.discs or problem.name.startswith("clipped"):
             continue
         scene = list(zip(*(a[0].tolist() for a in np.broadcast_arrays(*disc_arrays(problem))), strict=True))
-        coupling = field_model(problem, tolerance)._one_scene(scene)
+        coupling = field_model(problem, tolerance)._scenes.solve(scene)
         left += coupling is None
         if coupling is not None:
             volts = ports_of(problem, coupling=coupling).voltages
@@ -85,7 +85,7 @@ def test_the_error_that_is_told_holds_where_symmetry_hides_the_orders() -> None:
         exact, _ = solve_discs(sheet, 1000.0, lower, Discs(*np.array([scene]).transpose(2, 0, 1)), 64)
         for tolerance in (1e-3, 1e-5, 1e-7):
             model = FieldModel(sheet, 1000.0, lower, tolerance)
-            found = model._one_scene(scene)
+            found = model._scenes.solve(scene)
             if found is not None:
                 assert error_of(model, found, exact) <= found.error[0] <= tolerance, (sheet, scene, lower)
 
@@ -115,7 +115,7 @@ def test_a_model_answers_one_scene_as_it_answers_many() -> None:
     ],
 )
 def test_what_cannot_be_or_needs_more_is_left_to_the_multipoles(scene: list[tuple[float, float, float, float]]) -> None:
-    assert FieldModel(CONE, 1000.0, 300.0, 1e-9)._one_scene(scene) is None
+    assert FieldModel(CONE, 1000.0, 300.0, 1e-9)._scenes.solve(scene) is None
 
 
 def test_a_disc_that_cannot_be_is_refused_by_name() -> None:
@@ -124,7 +124,7 @@ def test_a_disc_that_cannot_be_is_refused_by_name() -> None:
 
 
 def test_no_contact_has_its_centre_and_no_conductance() -> None:
-    found = FieldModel(CYLINDER, 1000.0, 300.0)._one_scene([(0.05, 0.5, 0.01, 0.0)])
+    found = FieldModel(CYLINDER, 1000.0, 300.0)._scenes.solve([(0.05, 0.5, 0.01, 0.0)])
     assert found is not None
     assert found.conductance[0] == 0.0
     assert (found.x[0], found.y[0]) == pytest.approx((0.5, 0.25))
