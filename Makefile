@@ -45,7 +45,7 @@ pure:
 # what users install, by a quick C compiler: the wheel of the source distribution, and beside it what is in it
 build/compiled/done: setup.py $(shell find -L src/coneskin -name '*.py') | $(VENV)/dev.stamp
 	rm -rf build/compiled
-	$(BIN)/python -m build -q --sdist --outdir build/compiled
+	$(BIN)/python -m build -q --sdist --no-isolation --outdir build/compiled
 	CONESKIN_COMPILE=1 $(BIN)/python -m pip wheel -q --no-deps --no-build-isolation -w build/compiled build/compiled/*.tar.gz
 	$(BIN)/python -m zipfile -e build/compiled/*.whl build/compiled
 	touch build/compiled/*.so build/compiled/coneskin/*/*.so && touch $@

@@ -189,28 +189,6 @@ class Sensor:
         around = 0.0 if around < 0.0 else 1.0 if around > 1.0 else around
         return self._from_end1.distance(along), self._wrap * around
 
-    def potentials(self, u: float, phi: float) -> tuple[float, float]:
-        """Return the potentials Ur and Ut at a place [V] (eq. 19, 22); u [m] and phi [rad] as in ``fractions``."""
-        radial, angular = self.fractions(u, phi)
-        return radial * self.electronics.supply_volts, angular * self.electronics.supply_volts
-
-    def polar(self, radial_volts: float, angular_volts: float) -> tuple[float, float]:
-        """Return polar coordinates on the flat sector from the two potentials, eq. 20 and 24 as the paper has them.
-
-        Args:
-            radial_volts: Ur [V].
-            angular_volts: Ut [V].
-
-        Returns:
-            r [m] and theta [rad]; on a cylinder r is infinite and theta 0, which is why nothing else here uses them.
-        """
-        supply = self.electronics.supply_volts
-        fraction = radial_volts / supply
-        scale = self._from_end2 if self.b_positive else self._from_end1
-        around = angular_volts / supply if self.c_positive else 1.0 - angular_volts / supply
-        q = abs(self.frustum.sin_half_angle)
-        return (scale.radius(fraction) / q if q else float("inf")), self._wrap * around * q
-
     def radial_sensitivity(self, u: float) -> float:
         """Return the change of the radial potential along the side at u [m]: dUr/du [V/m], signed.
 

@@ -78,10 +78,6 @@ class LogScale:
             return _log1p(x) / self._log_ratio
         return _log(ratio) / self._log_ratio
 
-    def radius(self, fraction: float) -> float:
-        """Return the link's radius [m] where this fraction of the potential has passed: eq. 20 as printed."""
-        return float(self.near * self._ratio**fraction)
-
     def slope(self, distance: float) -> float:
         """Return the derivative of the fraction by the distance [1/m], eq. 25 over U0 in terms of the distance."""
         s = self.length

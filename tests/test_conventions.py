@@ -81,7 +81,7 @@ def test_r_follows_u_as_the_document_says(cone: Frustum, sign: float) -> None:
 
 def test_b_is_at_end_1_and_c_at_the_far_edge() -> None:
     sensor = Sensor(Frustum(0.04, 0.07, 0.15))
-    assert sensor.potentials(0.0, 0.0) == (2.5, 0.0)  # on B and on D
-    radial, angular = sensor.potentials(sensor.frustum.slant, sensor.frustum.wrap)  # on A and on C
+    assert sensor.fractions(0.0, 0.0) == (1.0, 0.0)  # on B and on D
+    radial, angular = sensor.fractions(sensor.frustum.slant, sensor.frustum.wrap)  # on A and on C
     assert radial == pytest.approx(0.0, abs=1e-15)
-    assert angular == 2.5
+    assert angular == 1.0

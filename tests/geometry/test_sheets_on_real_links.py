@@ -75,7 +75,8 @@ def test_touches_on_the_mesh_come_back_through_the_sensor() -> None:
         touched = (start + rays.cast(start, inward)[0][:, None] * inward)[0]
         u, phi, above = UPPER_ARM.locate((float(touched[0]), float(touched[1]), float(touched[2])))
         assert abs(above) < 1e-4
-        radial, angular = (parts.volts(parts.count_volts(v)) / parts.supply_volts for v in sensor.potentials(u, phi))
+        volts = [part * parts.supply_volts for part in sensor.fractions(u, phi)]
+        radial, angular = (parts.volts(parts.count_volts(v)) / parts.supply_volts for v in volts)
         u2, phi2 = sensor.place(radial, angular)
         assert abs(u2 - u) <= step_u  # half a count is rounding, the other half that of the full scale
         assert abs(phi2 - phi) <= step_phi

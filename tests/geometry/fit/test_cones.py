@@ -320,12 +320,12 @@ def test_two_partial_wraps_share_a_tube() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("samples", [3000, 40_000])
-def test_the_sheets_do_not_depend_on_the_samples(samples: int) -> None:
-    one, two = (find_cones(placed(noisy(rugby(), 2e-4)), samples=count) for count in (6000, samples))
-    assert [sheet.placed for sheet in one.sheets] == [sheet.placed for sheet in two.sheets]
-    for a, b in zip(one.sheets, two.sheets, strict=True):
-        assert a.area_share == pytest.approx(b.area_share, abs=0.02)
+def test_the_sheets_do_not_depend_on_the_samples() -> None:
+    one, *others = (find_cones(placed(noisy(rugby(), 2e-4)), samples=count) for count in (6000, 3000, 40_000))
+    for other in others:
+        assert [sheet.placed for sheet in one.sheets] == [sheet.placed for sheet in other.sheets]
+        for a, b in zip(one.sheets, other.sheets, strict=True):
+            assert a.area_share == pytest.approx(b.area_share, abs=0.02)
 
 
 @pytest.mark.long
@@ -334,7 +334,7 @@ def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-unt
     mesh = placed(noisy(body(), 1e-4))
     areas = [
         sum(sheet.frustum.area for sheet in cones(mesh, tolerance=tolerance).sheets)
-        for tolerance in (5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 3e-3)
+        for tolerance in (5e-4, 1e-3, 1.4e-3, 3e-3)
     ]
     # a slice of 512 is 0.2 %, and a sheet more or less may be worth 5 % of the hull
     assert all(b > 0.99 * a for a, b in itertools.pairwise(areas))
