@@ -53,6 +53,10 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
     assert drawn.count("10 kohm") == 2
     assert "shunt 11.3 ohm" in drawn
     assert "| shunt, 1 % | 11.3 ohm |" in page
+    counts = {where: int(count) for count, where in re.findall(r"^\| (\d) \|.*\| ([^|]+) \|$", page, re.MULTILINE)}
+    four = ("rail to A, B, C, D", "each gate of a switch to ground: open while the board starts")
+    assert {counts[where] for where in (*four, "A, B, C, D to ground, at the channels")} == {4}
+    assert counts["C and D to their pull-down pins"] == 2
     assert str(folder / "board.md") in capsys.readouterr().out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,6 +12,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
 from coneskin.geometry.fit.axis_plan import Region, _largest_region
+from coneskin.geometry.fit.coarse_packing import Choice
 
 Grid = NDArray[np.bool_]
 GRIDS = arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7), elements=st.booleans())
@@ -98,3 +101,9 @@ def test_a_full_turn_is_one_region() -> None:
 @pytest.mark.parametrize(("rows", "columns"), [(7, 1), (1, 11)])
 def test_more_than_the_grid_is_none(rows: int, columns: int) -> None:
     assert _largest_region(np.ones((6, 10), bool), rows, columns) is None
+
+
+def test_a_choice_counts_its_full_and_its_partial_wraps() -> None:
+    sides = [SimpleNamespace(columns=columns) for columns in (72, 40, 30)]
+    plan = SimpleNamespace(profile=SimpleNamespace(phi=range(72)), sides=sides)
+    assert Choice(0, plan).kinds == (1, 2)  # type: ignore[arg-type]
