@@ -28,7 +28,9 @@ PATIENT = (
     "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
 )
 #: what a guard says where this computer has held it up in a motion away
-_HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for", "the time of 2.0 s")
+_HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for")
+#: ... and where it touched the arm, or let it move away, so late that its way or its time was used up
+_HELD_UP += ("as far as arm_distance_mm lets it", "the time of 2.0 s is over")
 _TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
 
 
