@@ -162,7 +162,7 @@ class _Work:
                 lost, stopped = self._lost(), isinstance(exc, Collision | RobotRefused)
                 if (lost and (self._once or not self._external)) or not (lost or stopped):
                     raise
-                print(f"coneskin guard: {exc}", file=sys.stderr, flush=True)
+                print_line(f"coneskin guard: {exc}", sys.stderr)
                 if self._once:
                     return
                 if lost:

@@ -14,7 +14,7 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
@@ -49,10 +49,11 @@ def print_hint(text: str) -> None:
         print_line(text)
 
 
-def print_line(text: str) -> None:
-    """Print a line in one piece: lines of several threads never share one, as those of ``print`` do in a pipe."""
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
+def print_line(text: str, file: TextIO | None = None) -> None:
+    """Print a line in one piece, to the standard output or a file: lines of several threads never share one."""
+    stream = sys.stdout if file is None else file
+    stream.write(f"{text}\n")
+    stream.flush()
 
 
 def typed_lines() -> queue.SimpleQueue[str]:
