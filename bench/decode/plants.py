@@ -156,6 +156,8 @@ SEVERAL_KINDS = (
     "three fingers",
     "four fingers",
     "palm",
+    "polygon",
+    "arc",
 )
 
 
@@ -207,12 +209,24 @@ def _several(kind: str, plant: FlatPlant, rng: random.Random) -> list[PressedPat
             disc(u + side * 0.5 * apart * math.cos(turn), phi + side * 0.5 * apart * math.sin(turn) / around)
             for side in (-1.0, 1.0)
         ]
+    elif kind in ("polygon", "arc"):  # round a place that nothing touches, of any weights: unequal ones in every third
+        count, turn = rng.randint(3, 8), rng.uniform(0.0, 2.0 * math.pi)
+        span = 2.0 * math.pi * (1.0 if kind == "polygon" else rng.uniform(0.4, 0.9))
+        apart, spread = math.exp(rng.uniform(math.log(0.013), math.log(0.1))), rng.choice((0.0, 0.0, 1.0))
+        phi, ka = rng.uniform(0.0, plant.wrap), math.exp(rng.uniform(math.log(0.05), math.log(6.0)))
+        ring = [(u + apart * math.cos(a), phi + apart * math.sin(a) / around) for a in _angles(count, turn, span)]
+        found = [PressedPatch.disc(*place, 0.5 * radius, ka * math.exp(rng.uniform(-spread, spread))) for place in ring]
+        return found if _fit(plant, found) else None
     else:
         found = [
             disc(rng.uniform(0.015, plant.slant - 0.015), rng.uniform(0.0, plant.wrap))
             for _ in range({"two": 2, "three": 3, "four": 4}[kind.split()[0]])
         ]
     return found if _fit(plant, found) and _spread(plant, found) >= (0.0 if "seam" in kind else 0.06) else None
+
+
+def _angles(count: int, turn: float, span: float) -> list[float]:
+    return [turn + span * n / count for n in range(count)]
 
 
 def _fit(plant: FlatPlant, patches: Sequence[PressedPatch]) -> bool:

@@ -14,7 +14,7 @@ from .cells import electronics
 from .plants import SEVERAL_KINDS, SHEETS, Case, SolvedPlants, disc_cases, several_cases
 from .runs import LEARNED_FRAMES, Sitting, decode
 
-PRESS_FRAMES = 20
+PRESS_FRAMES = 100
 MAX_NORMAL_ERROR = math.radians(20.0)
 _AT_ONCE = 500  # presses that are decoded together
 

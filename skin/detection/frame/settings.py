@@ -29,7 +29,7 @@ class DetectorSettings:
         current_drift: fastest drift of the untouched drive currents that is followed, as a ratio of them [1/s].
         second_contact: weakest second contact that a certain place excludes where its normal is 20 deg off [S]. The
             spreading in the sheets is part of it. 0.7 mS is what 2 N of the virtual skin's contact leave of 1.5 mS.
-        largest_contact: radius up to which one contact is taken for one [m].
+        largest_contact: radius up to which one contact is taken for one [m]; less on a narrow link, where it is 26 deg.
         lasting_touch: a touch this long is a fault as well [s]. It is never taken for the new zero.
         stuck_frames: once the radial current, the angular current or the supply of a phase has repeated its value in
             so many frames in a row, that is a fault: each of them has noise in a working device, and a current that is

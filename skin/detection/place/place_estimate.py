@@ -44,6 +44,7 @@ _MAX_KA_WEIGHT = 6.0  # a bond has an infinite ka, and is no less usual than thi
 _LAST_NODE = 6
 _NODE_NUMBERS = range(_LAST_NODE + 1)
 _MIN_C = 0.003  # ka of 300: a bond
+_MIN_DISC_C = 0.25  # of the largest disc that is one contact; less is a ring of firm contacts, or a larger one
 _NODE_WIDTH = 0.35  # of the distance between a node's neighbours
 _MODEL_VARIANCE = 0.05**2  # of A^2; no real contact is a uniform disc
 _MODEL_RADIUS = 0.1  # of ln a; half the distance of two nodes, and the same
@@ -57,6 +58,11 @@ class _DipoleStrength(NamedTuple):
     gain: float  #: how far it follows what was measured, 0..1
     log_radius: float  #: mean of ln a, a in m
     log_radius_deviation: float  #: standard deviation of ln a
+
+
+def _disc_share(c: float) -> float:
+    """Return f = I_2(ka)/I_0(ka) by c: the dipole of a disc over that of a bond. To .4 %, exact at both ends."""
+    return 1.0 / (1 / 3 + 4.0 * c + 2 / 3 / (1.0 + c * (3.0 + 7.0 * c)))
 
 
 def _weigh_dipole(
@@ -91,10 +97,10 @@ def _weigh_dipole(
         twice = 1.0 + c + c
         off, ka = c - shift - _USUAL_RADIUS, math.log(twice / (c * c))
         ka *= _WEIGHT_KA * ka
-        # 1/f = I_0/I_2 to .4 %, exact at both ends; the last is d ln a/dz, but for a factor
+        # the last is d ln a/dz, but for a factor
         nodes.append(
             (
-                power / (1 / 3 + 4.0 * c + 2 / 3 / (1.0 + c * (3.0 + 7.0 * c))),
+                power * _disc_share(c),
                 c - shift,
                 _WEIGHT_RADIUS * off * off + (ka if ka < _MAX_KA_WEIGHT else _MAX_KA_WEIGHT),
                 z,
@@ -173,6 +179,7 @@ class PlaceEstimate(NamedTuple):
     move_x: float  #: from the electrical centre to the place, in the rectangle [m]
     move_y: float
     dipole: _DipoleStrength
+    spread: float  #: c of a disc of 1 m that has the conductance: 2 pi/Rs (1/G - Robin function) less ln of the stretch
 
 
 class PlaceEstimator:
@@ -255,7 +262,8 @@ class PlaceEstimator:
         noise_unequal = 0.25 * (noise_xx + noise_yy - 2.0 * noise_both)
         per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
         tolerated = (xx + yy) / (per_dipole + 1e-12 * rs * rs)
-        dipole = _weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
+        beyond = 1.0 / matrix.conductance - robin
+        dipole = _weigh_dipole(measured, noise, rs, beyond, stretch, tolerated)
         prior = (_ROUND_INEQUALITY * dipole.strength) ** 2
         gain1, gain2 = _gain(unequal, noise_unequal, prior), _gain(a_xy, noise_xy, prior)
         half, cross = gain1 * unequal, gain2 * a_xy
@@ -301,7 +309,17 @@ class PlaceEstimator:
         stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
-        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole)
+        spread = 2.0 * math.pi / rs * beyond - math.log(stretch)
+        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole, spread)
+
+    def disc_dipole(self, radius: float, spread: float) -> float:
+        """Return the dipole of one disc of a radius [m] that has the measured conductance, on the sheet [S m^2].
+
+        No disc of that conductance within the radius has more: what is narrower must be firmer, and adds less.
+        0 where not even a bond within three quarters of the radius has the conductance.
+        """
+        c = math.log(radius) + spread
+        return 2.0 * math.pi / self._sum * radius * radius * _disc_share(c) if c > _MIN_DISC_C else 0.0
 
     def place(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float]:
         """Return u [m] and phi [rad] of an electrical centre and the move from there to the place [m]."""

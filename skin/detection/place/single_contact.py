@@ -2,9 +2,14 @@
 
 Together the contacts add a tensor P to the conductances along and around the sheets (docs/understand/field.md): P_xx to
 the radial drive current, P_yy to the angular one, P_xy splits the guides. One disc adds equally in all directions, at
-most as much as a perfect bond. Two contacts of conductance G1 and G2 at a distance s add G1 G2 s^2/(G1 + G2) along
-the line between them and nothing across. So the inequality of P, over the square of a distance, is the conductance of
-the second contact: everything here is in siemens at a distance of DANGEROUS_ANGLE about the axis.
+most as much as the largest disc that has the measured conductance G. Two contacts of conductance G1 and G2 at a
+distance s add G1 G2 s^2/(G1 + G2) along the line between them and nothing across. So the inequality of P, over the
+square of a distance, is the conductance of the second contact: everything here is in siemens at a distance of
+DANGEROUS_ANGLE about the axis.
+
+Contacts that lie evenly round a place, at a distance s from it, add equally as well: G s^2/2, or more where they press
+firmly, for the sheets part them. A disc of radius a adds G a^2/4 where it presses lightly. So a limit on the radius of
+one contact tells it from all that lies round it: no contact needs to be known by itself.
 """
 
 from __future__ import annotations
@@ -37,13 +42,17 @@ DANGEROUS_ANGLE = math.radians(20.0)
 _PAIR_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
 _PAIR_FRAMES = 512  # frames; the average reaches back so far
 _LINE_DEVIATIONS = 4.0  # standard deviations of an inequality that is one
+_DISC_TOLERANCE = (
+    1.1  # ratio; a disc of 15 mm at an edge adds 1.04 times what the largest one may, contacts round it 1.17
+)
+_LARGEST_ANGLE = 1.3 * DANGEROUS_ANGLE  # of a radius: a disc this large adds less than contacts at DANGEROUS_ANGLE
 _ROUND_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm at an edge shows .07, two of 5 mm 20 mm apart 1.4
 _CERTAIN_SHARE = 0.9  # of the limit; what is not certain must fall below it to become so
 
 _CURRENTS_UNKNOWN = "the untouched drive currents are not known yet"
 _TOO_FEW_FRAMES = "too few frames yet to exclude a second contact"
 _SEVERAL_CONTACTS = "the drive currents rise unequally, or the guides differ: several contacts, or a long one"
-_LARGE_CONTACT = "the drive currents rise more than by one contact: several, or a very large one"
+_LARGE_CONTACT = "the drive currents rise more than by one contact: several round this place, or a very large one"
 _COARSE_READINGS = "the readings are too coarse to exclude a second contact so lightly touched"
 
 
@@ -68,8 +77,7 @@ class SingleContactTest:
         self._limit = settings.second_contact
         self._radius1, self._taper = cone.radius1, cone.sin_half_angle
         self._per_along, self._per_cross = self._angles * aspect**2, 2.0 * self._angles * aspect
-        sheets = sensor.upper_sheet_ohms + sensor.lower_sheet_ohms
-        self._largest = 2.0 * math.pi * (settings.largest_contact / DANGEROUS_ANGLE) ** 2 / sheets
+        self._largest = settings.largest_contact
         self._scale = self._unit * max(1.0, _split_noise(sensor, aspect))
         self._upper = self._lower = 0.0
         self.begin()
@@ -77,18 +85,23 @@ class SingleContactTest:
     def begin(self) -> None:
         """Forget the evidence: another touch, or another place."""
         self._frames = 0
-        self._differ = self._across = self._mean = self._required = 0.0
+        self._differ = self._across = self._mean = self._required = self._disc = 0.0
         self._certain = False
         if self._currents.frames:
             self._upper, self._lower = self._inversion.untouched(self._currents.radial, self._currents.angular)
 
-    def feed(self, matrix: ContactMatrix, level: float, u: float) -> str:
+    def largest_disc(self, u: float) -> float:
+        """Return the radius up to which one contact at u [m] is taken for one [m]."""
+        return min(self._largest, _LARGEST_ANGLE * (self._radius1 + self._taper * u))
+
+    def feed(self, matrix: ContactMatrix, level: float, u: float, disc: float | None) -> str:
         """Take a frame of the touch.
 
         Args:
             matrix: of a valid frame.
             level: its level, the drift taken off.
             u: where it is read [m].
+            disc: dipole of the largest disc that has the conductance of the touch [S m^2]; None with the first frame.
 
         Returns:
             why there may be more than one contact. Empty once that is excluded.
@@ -107,6 +120,10 @@ class SingleContactTest:
         self._differ = differ = self._differ + gain * (rise2 - rise1 - self._differ)
         self._across = across = self._across + gain * (self._per_cross * cross - self._across)
         self._mean += gain * (0.5 * (rise1 + rise2) - self._mean)
+        if disc is not None:
+            distance = DANGEROUS_ANGLE * (self._radius1 + self._taper * u)
+            largest = _DISC_TOLERANCE * disc / (distance * distance)
+            self._disc = self._disc + gain * (largest - self._disc) if self._disc else largest
         self._required = required = self._required + gain * ((total if total < limit else limit) - self._required)
         # what is seen, compared with what the weakest dangerous pair would show
         noise = self._scale * math.sqrt(currents.variance * (gain + 1.0 / learned))
@@ -119,9 +136,11 @@ class SingleContactTest:
             if seen - slack > limit:
                 return _SEVERAL_CONTACTS
             return _TOO_FEW_FRAMES if frames < _PAIR_FRAMES else _COARSE_READINGS
-        radius = self._radius1 + self._taper * u
-        if (self._mean + slack) * radius * radius > self._largest:
-            return _LARGE_CONTACT
+        # the mean of two rises has half the noise of their difference
+        if disc is not None and self._mean + 0.5 * held > self._disc:
+            return (
+                _LARGE_CONTACT if self._mean - 0.5 * slack > self._disc or frames >= _PAIR_FRAMES else _TOO_FEW_FRAMES
+            )
         self._certain = True
         return ""
 

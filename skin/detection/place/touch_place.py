@@ -207,7 +207,7 @@ class TouchPlace:
         u, phi = self._estimator.place(matrix.x, matrix.y, 0.0, 0.0)
         if self._map is not None:
             u, phi = self._map.apply(u, phi)
-        doubt = self._doubt(reading, matrix, level, u) or MOVES
+        doubt = self._doubt(reading, matrix, level, u, None) or MOVES
         return TouchReading(now, level, u, phi, False, doubt, frame.clock_us, frame.sequence)
 
     def feed(self, frame: Frame, reading: Reading, level: float, now: float, period: float) -> TouchReading:
@@ -242,7 +242,7 @@ class TouchPlace:
         u, phi = self._estimator.place(x, y, estimate.move_x, estimate.move_y)
         if self._map is not None:
             u, phi = self._map.apply(u, phi)
-        doubt = self._doubt(reading, matrix, level, u)
+        doubt = self._doubt(reading, matrix, level, u, estimate)
         if doubt and self._seam.closes and (seam := self._over_seam(reading, matrix, now)) is not None:
             doubt = seam.doubt
             return TouchReading(
@@ -333,7 +333,9 @@ class TouchPlace:
             ss=su * su * a + 2.0 * su * pp * b + pp * pp * c,
         )
 
-    def _doubt(self, reading: Reading, matrix: ContactMatrix, level: float, u: float) -> str:
+    def _doubt(
+        self, reading: Reading, matrix: ContactMatrix, level: float, u: float, estimate: PlaceEstimate | None
+    ) -> str:
         """Return why the place is not certain. Empty where it is."""
         if not reading.location_valid:
             self._newest = None
@@ -341,11 +343,13 @@ class TouchPlace:
         x, y, before = matrix.x, matrix.y, self._newest
         along, around = self._scale  # distances are never too small
         off_x, off_y = along * (x - self._first_x), around * (y - self._first_y)
+        single = self._single
         if not self._begun or off_x * off_x + off_y * off_y > self._slide:
-            self._single.begin()
+            single.begin()
             self._begun, self._first_x, self._first_y = True, x, y
         self._newest = x, y
-        doubt = self._single.feed(matrix, level, u)
+        disc = self._estimator.disc_dipole(single.largest_disc(u), estimate.spread) if estimate is not None else None
+        doubt = single.feed(matrix, level, u, disc)
         if before is None:
             return doubt or MOVES
         off_x, off_y = along * (x - before[0]), around * (y - before[1])

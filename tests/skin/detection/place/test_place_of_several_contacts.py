@@ -13,7 +13,11 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.place.single_contact import frames_until_certain, weakest_pair_excluded
+from coneskin.skin.detection.place.single_contact import (
+    DANGEROUS_ANGLE,
+    frames_until_certain,
+    weakest_pair_excluded,
+)
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import ContactModel, LayerContact, measure
@@ -125,6 +129,7 @@ def test_one_contact_is_soon_certain(shape):
 def test_no_single_disc_is_doubted(shape, along, around, radius, force):
     """The law: wherever a disc of up to 15 mm lies, it adds equally in all directions."""
     sensor = Sensor(SHAPES[shape])
+    radius = min(radius, 1.1 * DANGEROUS_ANGLE * sensor.frustum.radius1)  # a wider one is as a ring of 20 deg
     u = 1.05 * radius + along * (sensor.frustum.slant - 2.1 * radius)
     edge = 1.05 * radius / sensor.frustum.radius_at(u)
     contact = pressed(u, edge + around * (sensor.frustum.wrap - 2.0 * edge), force, radius)
@@ -150,6 +155,67 @@ def test_a_certain_place_is_never_far_from_a_contact(shape, kind):
         found = readings(sensor, contacts, field(), 150, seed)
         assert found  # it is a touch
         assert wrong(sensor, found, contacts) == 0
+
+
+def round_place(rng: random.Random, cone: Frustum) -> list[LayerContact]:
+    """Two to eight presses of any weights evenly round a place, 13 to 100 mm from it; those off the sheet are left."""
+    count, turn = rng.choice((2, 3, 4, 4, 5, 6, 8)), rng.uniform(0.0, math.tau)
+    distance = math.exp(rng.uniform(math.log(0.013), math.log(0.1)))
+    u0, phi0 = rng.uniform(0.2, 0.8) * cone.slant, rng.uniform(0.2, 0.8) * cone.wrap
+    force, spread = math.exp(rng.uniform(math.log(0.6), math.log(20.0))), rng.choice((0.0, 0.3, 1.0))
+    radius = cone.radius_at(u0)
+    contacts: list[LayerContact] = []
+    for n in range(count):
+        angle = turn + math.tau * n / count
+        u, phi = u0 + distance * math.cos(angle), phi0 + distance * math.sin(angle) / radius
+        one = pressed(u, phi, max(0.55, force * math.exp(rng.uniform(-spread, spread))))
+        edge = one.radius
+        on_sheet = edge < u < cone.slant - edge and edge < radius * phi < radius * cone.wrap - edge
+        apart = (math.hypot(u - c.u, radius * (phi - c.phi)) - c.radius for c in contacts)
+        if on_sheet and all(gap > 1.1 * edge for gap in apart):
+            contacts.append(one)
+    return contacts
+
+
+def far(sensor: Sensor, found: Sequence[TouchReading], contacts: Sequence[LayerContact]) -> int:
+    """How many frames have a certain place farther than 20 mm or 20 deg from every contact."""
+    return sum(
+        reading.location_valid
+        and all(
+            off_normal(sensor, reading, one) > 20.0
+            or math.hypot(
+                reading.u - one.u, sensor.frustum.radius_at(one.u) * math.remainder(reading.phi - one.phi, math.tau)
+            )
+            > 0.02
+            for one in contacts
+        )
+        for reading in found
+    )
+
+
+@pytest.mark.promise("P02")
+@pytest.mark.parametrize("shape", SHAPES)
+def test_contacts_round_a_place_are_never_certain_in_their_middle(shape):
+    """Four fingers round a place add equally in all directions, as one does: they add more than one disc can."""
+    sensor, rng = Sensor(SHAPES[shape]), random.Random(6)
+    cases = [contacts for contacts in (round_place(rng, sensor.frustum) for _ in range(24)) if len(contacts) > 2]
+    assert len(cases) > 8
+    for seed, contacts in enumerate(cases):
+        assert far(sensor, readings(sensor, contacts, field(), 150, seed), contacts) == 0
+
+
+def test_four_light_tips_are_doubted_however_long_they_rest():
+    """Tips of .25 mS at 30 mm along and around: their middle was certain in 98 of 100 frames, 46 deg off each."""
+    sensor = Sensor(FOREARM)
+    around = 0.03 / 0.0375
+    tips = [(0.09, 3.0), (0.15, 3.0), (0.12, 3.0 - around), (0.12, 3.0 + around)]
+    contacts = [LayerContact(u, phi, 2.5e-4, 0.004, 0.004) for u, phi in tips]
+    found = readings(sensor, contacts, field(), 600)
+    assert not any(reading.location_valid for reading in found)
+    assert (
+        found[-1].doubt
+        == "the drive currents rise more than by one contact: several round this place, or a very large one"
+    )
 
 
 @pytest.mark.long
