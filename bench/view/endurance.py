@@ -57,7 +57,7 @@ def main() -> None:
         first = header_of()
         recorder.write(first, flush=True)
         live = LiveRun(Path(folder) / "run.rec")
-        page = LivePage(server, live.course.stage, lambda: live)
+        page = LivePage(server, live.course.stage, lambda _: live)
         follow(args, recorder, server, live, page)
         page.close()
 

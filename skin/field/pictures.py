@@ -167,7 +167,7 @@ def paint_error(
         MissingExtra: matplotlib is not installed.
     """
     figure, (axes,) = make_figure(5.6, 4.9)
-    reach = max(float(np.nanmax(np.abs(error))), reach)
+    reach = max(float(np.nanmax(np.abs(error))), reach)  # as far below 0 as above
     edges = np.meshgrid(_cell_edges(u), _cell_edges(phi), indexing="ij")
     picture = axes.pcolormesh(*_plane(sheet, *edges), error, cmap="RdBu_r", vmin=-reach, vmax=reach)
     scale = figure.colorbar(picture, ax=axes, label=label, shrink=0.85)

@@ -46,14 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show the studio."""
     from coneskin.design.link_design import load_link
-    from coneskin.design.studio.studio_page import StudioPage
+    from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
     from coneskin.design.studio.workbench import Workbench
     from coneskin.view.page_server import PageServer
 
     def bench_of(link: LinkMesh) -> Workbench:
         return Workbench.of(link, tolerance=1e-3 * args.tolerance_mm)
 
-    with PageServer("coneskin studio", port=args.port, uploads=True) as server:
+    with PageServer("coneskin studio", port=args.port, uploads=FILE_DROP) as server:
         if not args.json:
             print(f"looking for sheets in {args.link} ...", file=sys.stderr, flush=True)
         bench = bench_of(next(iter(load_link(args.link, args.unit))))

@@ -2,18 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import cycle, islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import ConeSkinError, MissingExtra
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["write_picture"]
+__all__ = ["degree_ticks", "picture_style", "write_picture"]
 
 _PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
+#: of lines that no eye takes for each other (Okabe and Ito 2008), and dashes, for paper without colour
+_LINE_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9", "#E69F00")
+_LINE_DASHES = ("-", "--", "-.", ":")
+
+
+@contextmanager
+def picture_style() -> Iterator[None]:
+    """Draw what is drawn inside in the one style of all pictures. matplotlib must be installed."""
+    import matplotlib
+    from cycler import cycler
+
+    count = len(_LINE_COLORS)
+    lines = cycler(color=_LINE_COLORS) + cycler(linestyle=list(islice(cycle(_LINE_DASHES), count)))
+    look = {"axes.prop_cycle": lines, "axes.spines.top": False, "axes.spines.right": False, "grid.alpha": 0.3}
+    words = {"text.parse_math": False, "text.usetex": False, "legend.fontsize": 8, "legend.frameon": False}
+    with matplotlib.rc_context({**look, **words, "axes.titlesize": 10, "axes.axisbelow": True}):
+        yield
+
+
+def degree_ticks(axis: Any, span: float) -> None:
+    """Set the ticks of an axis of degrees at every 45 or 90 of them.
+
+    Args:
+        axis: of matplotlib.
+        span: of the axis [deg].
+    """
+    from matplotlib.ticker import MultipleLocator
+
+    axis.set_major_locator(MultipleLocator(90.0 if span > 200.0 else 45.0 if span > 60.0 else 15.0))
 
 
 def write_picture(
@@ -44,7 +75,7 @@ def write_picture(
         raise MissingExtra("matplotlib", "a picture", "pictures") from exc
     matplotlib.use("Agg", force=False)
     # a name may have dollars in it; an overflow would be a warning, and a picture of nothing
-    with matplotlib.rc_context({"text.parse_math": False, "text.usetex": False}), np.errstate(over="raise"):
+    with picture_style(), np.errstate(over="raise"):
         try:
             compose().savefig(path, dpi=dpi)
         except ConeSkinError:

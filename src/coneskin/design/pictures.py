@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from coneskin.core.errors import MissingExtra
+from coneskin.core.picture_file import degree_ticks, picture_style
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
@@ -63,9 +64,10 @@ def draw_pictures(
 
     def picture(name: str, size: tuple[float, float], caption: str, draw: Callable[..., None], *args: Any) -> None:
         """Draw a picture on a figure of a size [inch]."""
-        figure = Figure(figsize=size, layout=None if draw is draw_link else "constrained")
-        draw(figure, *args)
-        figure.savefig(folder / "pictures" / f"{name}.png", dpi=130, bbox_inches="tight", pad_inches=0.15)
+        with picture_style():
+            figure = Figure(figsize=size, layout=None if draw is draw_link else "constrained")
+            draw(figure, *args)
+            figure.savefig(folder / "pictures" / f"{name}.png", dpi=130, bbox_inches="tight", pad_inches=0.15)
         done.append((caption, f"pictures/{name}.png"))
 
     progress("drawing the link")
@@ -117,8 +119,7 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
     heights = heights_by_ray(RayCaster(mesh), design.place, u, phi, tolerance) * 1e3
     axes = figure.add_subplot()
     shown = np.ma.masked_where(heights < -1e3 * tolerance, heights)
-    # the colours span the deviations, but at least a twentieth of the tolerance and at most all of it
-    limit = 1e3 * min(max(1e-3 * float(np.ma.filled(np.abs(shown), 0.0).max()), 0.05 * tolerance), tolerance)
+    limit = 1e3 * tolerance  # so that pictures can be compared, and white is a good fit
     axes.set_facecolor("#999999")
     extent = (0.0, math.degrees(side.wrap), 0.0, side.slant * 1e3)
     image = axes.imshow(
@@ -130,3 +131,9 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
         ylabel="slant distance u from end 1 [mm]",
         title=f"{design.name}: deviation of the mesh from the {design.place.kind}, tolerance {1e3 * tolerance:g} mm",
     )
+    degree_ticks(axes.xaxis, math.degrees(side.wrap))
+    for edge in axes.spines.values():  # the outline of the sheet
+        edge.set_visible(True)
+    seam = "seam" if design.has_seam else "edge"
+    for at in (0.0, 1.0):
+        axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")

@@ -27,9 +27,7 @@ class ContactMark(NamedTuple):
         point: in the frame of the link [m].
         normal: outward unit normal there.
         ellipse: the two half axes within which the place is with 95 % [m], or None.
-        line: half of the line on which contacts lie about the place [m], or None.
         located: the place is certain.
-        level: 0..1.
         strength: 1 while it lasts, then falling to 0.
     """
 
@@ -38,9 +36,7 @@ class ContactMark(NamedTuple):
     point: Vector
     normal: Vector
     ellipse: tuple[Vector, Vector] | None
-    line: Vector | None
     located: bool
-    level: float
     strength: float
 
 
@@ -117,18 +113,8 @@ def _mark(number: int, details: Mapping[str, Any]) -> ContactMark | None:
     if isinstance(axes, list | tuple) and len(axes) == 2:
         first, second = _vector(axes[0]), _vector(axes[1])
         ellipse = None if first is None or second is None else (first, second)
-    level = details.get("level")
-    return ContactMark(
-        number,
-        str(details.get("sensor")),
-        point,
-        normal,
-        ellipse,
-        _vector(details.get("line")),
-        details.get("location_valid") is True,
-        float(level) if isinstance(level, int | float) and math.isfinite(level) else 0.0,
-        1.0,
-    )
+    located = details.get("location_valid") is True
+    return ContactMark(number, str(details.get("sensor")), point, normal, ellipse, located, 1.0)
 
 
 def _vector(value: Any) -> Vector | None:

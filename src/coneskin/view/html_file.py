@@ -17,7 +17,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of
 
 from .page_server import PageServer, page_client
-from .panel import NOTICE, PAGE_LEGEND, state_of, timeline
+from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline
 from .run_course import Moment, RunCourse, event_lines
 from .stage.level_scale import force_words, level_bars, level_words
 from .stage.sheet_surface import SheetSurface
@@ -79,8 +79,7 @@ _PAGE_SCRIPT = """
 (function () {
   const data = JSON.parse(document.getElementById('coneskin-data').textContent);
   const panel = document.getElementById('coneskin');
-  const phases = [...panel.querySelectorAll('.coneskin-phase')];
-  const states = [...panel.querySelectorAll('.coneskin-state')];
+  const head = document.getElementById('coneskin-head');
   const clock = document.getElementById('coneskin-clock');
   const list = document.getElementById('coneskin-events');
   const cursors = [...panel.querySelectorAll('.coneskin-cursor')];
@@ -126,12 +125,10 @@ _PAGE_SCRIPT = """
       before = time;
       clock.textContent = (1e-3 * Math.floor(1e3 * (time + data.since))).toFixed(3) + ' s';
       cursors.forEach((cursor) => { cursor.style.left = (100 * time / data.duration) + '%'; });
+      const words = last(data.heads, time)[1];  // from Python, which has escaped what a recording says
+      if (head.innerHTML !== words) head.innerHTML = words;
       let bar = 0, pressed = 0;
-      data.runs.forEach((run, k) => {
-        const phase = last(run.phases, time);
-        phases[k].textContent = (data.runs.length > 1 ? run.title + ': ' : '') + phase[1];
-        phases[k].className = 'coneskin-phase ' + phase[2];
-        states[k].innerHTML = last(run.states, time)[1];  // from Python, which has escaped what a recording says
+      data.runs.forEach((run) => {
         run.levels.forEach((changes, sheet) => {
           const level = last(changes, time)[1];
           levels[bar].textContent = run.words[sheet][level];
@@ -233,24 +230,28 @@ def _serialized(
 
 def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[_LevelChanges]) -> str:
     several = len(courses) > 1
-    runs, parts, bars = [], [], []
+    runs, bars = [], []
     for course, levels in zip(courses, changes, strict=True):
-        phases = [[max(c.time - course.zero - since, 0.0), c.phase.text, c.phase.kind] for c in course.history.phases]
-        states = [[0.0, ""]]
-        for event in course.history.events[:_MAX_EVENTS]:
-            if (state := state_of(course, event.time)) != states[-1][1]:
-                states.append([event.time - course.zero - since, state])
-        runs.append({"title": course.stage.title, "phases": phases, "states": states, **levels.data()})
-        title = "" if several else f'<div class="coneskin-title">{escape(course.stage.title)}</div>'
-        parts.append(f'{title}<div class="coneskin-phase"></div><div class="coneskin-state"></div>')
+        runs.append(levels.data())
         force = course.history.force(course.zero + since)
         none = {sheet.name: 0.0 for sheet in course.stage.sheets}
         bars.append(level_bars(course.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
-    events = [(line.time - since, " ".join(line.text.split())) for line in event_lines(courses)[:_MAX_EVENTS]]
-    data = {"since": since, "duration": max(until - since, 1e-3), "runs": runs, "events": events}
+    lines = event_lines(courses)[:_MAX_EVENTS]
+    heads = {at - since: _head(courses, at) for at in dict.fromkeys([since, *(line.time for line in lines)])}
+    events = [(line.time - since, " ".join(line.text.split())) for line in lines]
+    facts = {"since": since, "duration": max(until - since, 1e-3), "heads": list(heads.items())}
+    data = {**facts, "runs": runs, "events": events}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
+    title = "" if several else f'<div class="coneskin-title">{escape(courses[0].stage.title)}</div>'
     return (
-        f'<div id="coneskin">{NOTICE}{"".join(parts)}<div id="coneskin-clock"></div>{timeline(courses, since, until)}'
+        f'<div id="coneskin">{NOTICE}{title}<div id="coneskin-head"></div><div id="coneskin-clock"></div>'
+        f"{timeline(courses, since, until)}"
         f'{"".join(bars)}{trace_drawings(courses, since, until)}<div id="coneskin-events"></div>{PAGE_LEGEND}</div>'
         f'<script type="application/json" id="coneskin-data">{text}</script><script>{_PAGE_SCRIPT}</script>'
     )
+
+
+def _head(courses: Sequence[RunCourse], at: float) -> str:
+    """Return the phases and the cards of runs at a time on the page's clock [s]."""
+    moments = ((course, course.zero + at) for course in courses)
+    return status([(course.stage.title, course.history.phase(t), state_of(course, t)) for course, t in moments])

@@ -12,8 +12,7 @@ _PANEL_STYLE = """
 #coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px}
 #coneskin-notice,.coneskin-phase,.coneskin-card,.coneskin-title,#coneskin-stale,#coneskin-clock,#coneskin-levels,
 #coneskin-events,#coneskin-traces,#coneskin-legend{margin:4px 10px}
-.coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;background:#6b7280}
-.coneskin-phase::before{content:"? "}
+.coneskin-phase{color:#fff;padding:6px 10px;font-size:15px;background:#6b7280}.coneskin-phase::before{content:"? "}
 .coneskin-phase.active{background:#1d7dc9}.coneskin-phase.active::before{content:"\\25B6\\FE0E  "}
 .coneskin-phase.moving{background:#fff3b8;color:#111827;outline:1px solid #4a0d18}
 .coneskin-phase.moving::before{content:"\\25C6  "}
@@ -22,34 +21,25 @@ _PANEL_STYLE = """
 background:repeating-linear-gradient(45deg,#6b7280 0 8px,#5b616d 8px 16px)}
 .coneskin-old .coneskin-phase::before{content:"\\2715  "}
 .coneskin-old canvas[data-engine],.coneskin-old #coneskin-timeline{filter:grayscale(1) opacity(.35)}
-#coneskin-stale{background:#111827;color:#fbbf24;padding:6px 10px}
-#coneskin-stale:empty{display:none}
+#coneskin-stale{background:#111827;color:#fbbf24;padding:6px 10px}#coneskin-stale:empty{display:none}
 #coneskin-clock{font:13px monospace}
 .coneskin-card{border-left:6px solid #4a0d18;background:#f3f4f6;color:#111827;font-size:12px;padding:4px 8px}
 .coneskin-card th{text-align:left;font-weight:600;padding-right:1em;vertical-align:top;white-space:nowrap}
-.coneskin-title{font-size:13px;word-break:break-all;font-weight:700}
-#coneskin-levels,#coneskin-legend{font-size:12px}
+.coneskin-title{font-size:13px;word-break:break-all;font-weight:700}#coneskin-levels,#coneskin-legend{font-size:12px}
 #coneskin-events{font:11px/1.5 monospace}
 #coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
 display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
 #coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
 #coneskin-events>.alarm{color:#8f1421}#coneskin-events>.now{font-weight:700}#coneskin-events>.ahead{opacity:.45}
-.coneskin-timeline{position:relative;margin:4px 10px 0;overflow:hidden}
-#coneskin-timeline{width:100%;display:block}
+.coneskin-timeline{position:relative;margin:4px 10px 0;overflow:hidden}#coneskin-timeline{width:100%;display:block}
 .coneskin-cursor,.coneskin-pointer{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
-.coneskin-cursor{left:-9px}.coneskin-pointer{width:1px}
-#coneskin-traces{font-size:11px}
+.coneskin-cursor{left:-9px}.coneskin-pointer{width:1px}#coneskin-traces{font-size:11px}
 .coneskin-plot{position:relative;overflow:hidden;border-bottom:1px solid #111827;border-left:1px solid #111827}
 .coneskin-plot svg{display:block;width:100%;background:#f9fafb}
-.coneskin-plot>span{position:absolute;left:3px;background:#f9fafbcc;color:#111827}
-.coneskin-read{min-height:1.4em}
-.coneskin-ends{display:flex;justify-content:space-between}
-#coneskin-top{display:none}
-@media(max-width:700px){
+.coneskin-plot>span{position:absolute;left:3px;background:#f9fafbcc;color:#111827}.coneskin-read{min-height:1.4em}
+.coneskin-ends{display:flex;justify-content:space-between}#coneskin-top{display:none}@media(max-width:700px){
 #coneskin-top{display:block;position:fixed;z-index:20;left:0;right:0;top:0;background:#fff;padding:2px 0 4px;
-max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}
-[class*=Notifications-root]{display:none!important}
-}
+max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}[class*=Notifications-root]{display:none!important}}
 """
 
 _PANEL_SCRIPT = """

@@ -16,7 +16,7 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
 from .page_script import PANEL_HEAD
-from .viser_client import unpacked, with_file_drop, with_head, with_plain_edges
+from .viser_client import unpacked, with_head, with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
@@ -51,7 +51,7 @@ class PageServer:
         title: of the page's panel.
         host: address to listen at; another than this computer's lets its network look in.
         port: to listen at; the next free one where it is taken.
-        uploads: files may be dropped onto the page.
+        uploads: for the head of a page onto which files may be dropped; empty: none may.
 
     Attributes:
         gate: in front of it.
@@ -64,7 +64,7 @@ class PageServer:
         ConeSkinError: the address cannot be listened at, or there is no such port.
     """
 
-    def __init__(self, title: str, host: str = "127.0.0.1", port: int = 8080, uploads: bool = False) -> None:
+    def __init__(self, title: str, host: str = "127.0.0.1", port: int = 8080, uploads: str = "") -> None:
         if not 0 < port < 65536:  # viser would try a thousand ports beyond
             raise ConeSkinError(f"--port must be 1 to 65535, got {port}")
         viser = _viser()
@@ -78,8 +78,7 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        page = unpacked(page_client())
-        page = with_file_drop(page) if uploads else page
+        page = with_head(unpacked(page_client()), uploads)
         self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _MAX_UPLOAD_SIZE} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):

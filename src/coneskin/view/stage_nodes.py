@@ -133,12 +133,11 @@ class _MarkNodes:
     def __init__(self, scene: Any, name: str) -> None:
         self._scene, self._name = scene, name
         self._frame = scene.add_frame(name, show_axes=False, visible=False)
-        self._drawn: tuple[Any, ...] | None = None
-        self._parts: list[Any] = []
+        self._drawn: ContactMark | None = None
 
     def show(self, mark: ContactMark, side: PlacedFrustum) -> None:
         fading = math.ceil(mark.strength * _FADE_STEPS)
-        drawn = (mark._replace(strength=fading, level=0.0),)
+        drawn = mark._replace(strength=fading)
         if drawn != self._drawn:
             self._drawn = drawn
             self._draw(mark, side, fading / _FADE_STEPS)
@@ -225,11 +224,8 @@ def _half_axes(mark: ContactMark, side: PlacedFrustum) -> Floats:
     u, phi, _ = side.locate(mark.point)
     points, _ = side.place(np.array([u, u + 1e-4, u]), np.array([phi, phi, phi + 1e-4]))
     ways = (points[1:] - points[0]) / np.linalg.norm(points[1:] - points[0], axis=1)[:, None]
-    axes = np.array(mark.ellipse) @ ways.T
-    sizes = np.linalg.norm(axes, axis=1)
-    turned = np.array([[-axes[0][1], axes[0][0]]]) / max(sizes[0], 1e-12)
-    units = np.concatenate([axes[:1] / max(sizes[0], 1e-12), turned]) if sizes[0] > 0.0 else np.eye(2)
-    return np.asarray(units * np.maximum(sizes, _MIN_HALF_AXIS)[:, None])
+    units, sizes, _ = np.linalg.svd((np.array(mark.ellipse) @ ways.T).T)
+    return np.asarray((units * np.maximum(sizes, _MIN_HALF_AXIS)).T)
 
 
 def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Ints]:

@@ -1,4 +1,4 @@
-"""viser's client as a browser gets it: unpacked, with plain edges where a processor draws, open to dropped files.
+"""viser's client as a browser gets it: unpacked, and with plain edges where a processor draws.
 
 viser 1.1 ships one file, in which both are compressed and written in 88 letters; a browser spends a tenth of the time
 until the first picture on unpacking them, each time anew. A server does that once. What a page here never shows, the
@@ -8,9 +8,6 @@ served as it is.
 viser asks for smoothed edges in any case. Without a GPU they take a third of a picture's time (bench/RESULTS.md),
 so a worker asks what draws, while the page is still read. With a GPU nothing changes. viser also has each picture
 copied before it is shown, so that a server can ask for it. None does here.
-
-viser's own script takes a file from the dialogue of its button alone. Here a file that is dropped anywhere on the page
-goes the way of that button. A browser would leave the page otherwise, and show the file.
 """
 
 from __future__ import annotations
@@ -20,7 +17,7 @@ import gzip
 import json
 import re
 
-__all__ = ["unpacked", "with_file_drop", "with_head", "with_plain_edges"]
+__all__ = ["unpacked", "with_head", "with_plain_edges"]
 
 #: printable letters but those that mean something in HTML or in a string
 _BASE88_LETTERS = "".join(letter for letter in map(chr, range(0x21, 0x7F)) if letter not in "\"&<>'`")
@@ -85,37 +82,6 @@ def _letters_to_bytes(text: str) -> bytes:
         rest = 88 * rest + digit
     left = max(len(digits) - whole - 1, 0)
     return groups.astype(">u4").tobytes() + rest.to_bytes(left, "big")
-
-
-_FILE_DROP_SCRIPT = """
-(function () {
-  const carries = (event) => event.dataTransfer !== null && [...event.dataTransfer.types].includes('Files');
-  const show = (over) => { document.documentElement.style.boxShadow = over ? 'inset 0 0 0 4px #2563eb' : ''; };
-  document.addEventListener('dragover', (event) => {
-    if (!carries(event)) return;
-    event.preventDefault();
-    event.dataTransfer.dropEffect = 'copy';
-    show(true);
-  }, true);
-  document.addEventListener('dragleave', (event) => { if (event.relatedTarget === null) show(false); }, true);
-  document.addEventListener('drop', (event) => {
-    if (!carries(event)) return;
-    event.preventDefault();
-    show(false);
-    const button = document.querySelector('input[type=file]');
-    if (button === null || event.dataTransfer.files.length === 0) return;
-    const first = new DataTransfer();
-    first.items.add(event.dataTransfer.files[0]);
-    button.files = first.files;
-    button.dispatchEvent(new Event('change', { bubbles: true }));
-  }, true);
-})();
-"""
-
-
-def with_file_drop(page: str) -> str:
-    """Return a page with the script in its head."""
-    return with_head(page, f"<script>{_FILE_DROP_SCRIPT}</script>")
 
 
 _PLAIN_EDGES_SCRIPT = """

@@ -15,7 +15,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.link_design import LinkMesh, design_link
 from coneskin.design.sheets.sheet_design import DesignOptions
 from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, warning_list
-from coneskin.design.studio.studio_page import StudioPage
+from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
 from coneskin.design.studio.workbench import Handles, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
@@ -189,7 +189,7 @@ def test_the_studio_is_served_at_its_port_and_takes_files(monkeypatch: pytest.Mo
     server = Mock(side_effect=KeyboardInterrupt)
     monkeypatch.setattr("coneskin.view.page_server.PageServer", server)
     assert main(["studio", "link.stl", "--port", "8123"]) == 130
-    server.assert_called_once_with("coneskin studio", port=8123, uploads=True)
+    server.assert_called_once_with("coneskin studio", port=8123, uploads=FILE_DROP)
 
 
 def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
@@ -200,7 +200,7 @@ def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench
         other.append(link)
         return bench
 
-    with PageServer("studio", port=18190, uploads=True) as server:
+    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, load)
         nodes = set(server.scene._handle_from_node_name)
         assert {"/link", "/sheets/sheet 1/A", "/sheets/sheet 1/B", "/sheets/sheet 1/C", "/sheets/sheet 1/D"} <= nodes
@@ -229,7 +229,7 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
             page._take_upload()
         return replace(bench, link=link)
 
-    with PageServer("studio", port=18190, uploads=True) as server:
+    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, load)
         page._upload = SimpleNamespace(value=SimpleNamespace(name="slow.stl", content=data))
         page._take_upload()

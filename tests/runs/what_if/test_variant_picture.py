@@ -41,7 +41,9 @@ def test_variants_at_one_point_do_not_lie_on_each_other(tmp_path: Path) -> None:
 
     same = [VariantScore(f"level={level}", 9, 0, 1, 20, 0, 3, 0, 0.002, 0.004, 1.0) for level in (0.06, 0.08)]
     with rc_context({"svg.fonttype": "none"}):
-        draw_variants(same, tmp_path / "delay.svg")
+        draw_variants(same, tmp_path / "dot.svg")
+        draw_variants([*same, same[0]._replace(false_alarms=9)], tmp_path / "delay.svg")
+    assert "delay of the detection" not in (tmp_path / "dot.svg").read_text(encoding="utf-8"), "no panel of one dot"
     drawn = (tmp_path / "delay.svg").read_text(encoding="utf-8")
     assert ">1, 2<" in drawn  # one text at their point; the names stand below
     rows = [re.search(rf'y="([\d.]+)"[^>]*>{n}: level', drawn) for n in (1, 2)]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
-from coneskin.core.picture_file import write_picture
+from coneskin.core.picture_file import degree_ticks, write_picture
 from coneskin.robot.arm.kinematics import LINK_INDEX
 from coneskin.skin.materials import Padding
 
@@ -48,10 +48,9 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     figure = Figure(figsize=(12.0, 3.4 * max(2, len(sheets))), layout="constrained")
     left, right = figure.subfigures(1, 2, squeeze=False)[0]
     highest = max(curve.speeds[_LEVER_INDEX] for curve in found.curves)
-    lowest = min(curve.speeds[_LEVER_INDEX] for curve in found.curves)
     rows = left.subplots(len(sheets), 1, squeeze=False)[:, 0]
     for axes, name in zip(rows, sheets, strict=True):
-        drawn = _draw_sheet(axes, scene, found, name, (0.98 * lowest, 1.02 * highest))
+        drawn = _draw_sheet(axes, scene, found, name, highest)
     left.colorbar(
         drawn,
         ax=list(rows),
@@ -64,8 +63,9 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     return figure
 
 
-def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, scale: tuple[float, float]) -> Any:
-    wrap = next(item.sensor.frustum.wrap for item in scene.sensors if item.sensor.name == name)
+def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, highest: float) -> Any:
+    side = next(item.sensor.frustum for item in scene.sensors if item.sensor.name == name)
+    wrap = side.wrap
     rows = [(patch, row) for patch, row in zip(found.patches, found.table.patches, strict=True) if patch.sensor == name]
     along = sorted({patch.u for patch, _ in rows})
     around = sorted({patch.phi for patch, _ in rows})
@@ -77,13 +77,17 @@ def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, scale: tupl
         [1e3 * u for u in along],
         grid,
         shading="nearest",
-        vmin=scale[0],
-        vmax=scale[1],
+        vmin=0.0,
+        vmax=highest,
         cmap="viridis",
     )
     link = next((word for word, index in LINK_INDEX.items() if index == rows[0][0].link), "")
     axes.set(title=f"{name}, {link}", xlabel="phi [deg]", ylabel="u [mm]")
-    axes.set(xlim=(0.0, math.degrees(wrap)), ylim=(0.0, 1e3 * along[-1]))  # a cell of the mesh is wider than its sheet
+    axes.set(xlim=(0.0, math.degrees(wrap)), ylim=(0.0, 1e3 * side.slant))  # a cell of the mesh is wider than its sheet
+    degree_ticks(axes.xaxis, math.degrees(wrap))
+    for edge in axes.spines.values():  # the outline of the sheet; its two upright edges meet at the seam
+        edge.set_visible(True)
+    axes.text(0.0, 1.02, "seam", transform=axes.transAxes, fontsize=7, ha="center")
     return drawn
 
 
@@ -97,7 +101,7 @@ def _draw_curves(axes: Any, found: SpeedMap) -> None:
             named[number] = f"{what}, {word}" if len(ranked) > 1 else what
     for number, curve in enumerate(found.curves):
         if number not in named:
-            axes.plot(LEVERS, curve.speeds, color="0.75", linewidth=0.7)
+            axes.plot(LEVERS, curve.speeds, color="0.75", ls="-", linewidth=0.7)
     for number, name in named.items():
         curve = found.curves[number]
         mass = "any mass" if math.isinf(curve.mass) else f"up to {curve.mass:g} kg"
@@ -105,15 +109,16 @@ def _draw_curves(axes: Any, found: SpeedMap) -> None:
     axes.set(
         xlabel="lever: speed of the surface over that of the leading joint [m/rad]", ylabel="permissible speed [m/s]"
     )
-    axes.set_ylim(bottom=0.0)
+    axes.set(xlim=(0.0, LEVERS[-1]), ylim=(0.0, None))
     axes.legend(fontsize=7)
-    axes.grid(alpha=0.3)
+    axes.grid()
 
 
 def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -> None:
     """Draw the force over time at the permissible speed, for each region that limits one."""
     padding = scene.padding or Padding()
     times = [0.3 * n / 1500 for n in range(1501)]
+    axes.set_xlim(0.0, 1e3 * times[-1])
     for region in limits.regions:
         curve = next((item for item in found.curves if item.region == region.name), None)
         if curve is None:
@@ -122,7 +127,10 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
         contact = contact_at(speed, LEVERS[_LEVER_INDEX], curve.mass, region, limits.measured, padding, curve.extra)
         course = integrate(contact)
         (line,) = axes.plot(
-            [1e3 * t for t in times], [course.force(t) for t in times], label=f"{region.name} at {speed:.2f} m/s"
+            [1e3 * t for t in times],
+            [course.force(t) for t in times],
+            ls="-",
+            label=f"{region.name} at {speed:.2f} m/s",
         )
         axes.axhline(region.limits.transient, color=line.get_color(), linestyle="--", linewidth=0.8)
         axes.axhline(region.limits.lasting, color=line.get_color(), linestyle=":", linewidth=0.8)
@@ -134,4 +142,4 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
     )
     axes.set_ylim(bottom=0.0)
     axes.legend(fontsize=7)
-    axes.grid(alpha=0.3)
+    axes.grid()

@@ -26,7 +26,7 @@ __all__ = ["draw_run"]
 _EVENT_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
 _MAX_GAP = 0.05  # s between two states, from which on nothing is drawn between them: nobody has measured it
 _MIN_SPACING = 0.08  # of the width; marks that are closer share a label
-_JOINT_COLORS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:cyan")  # red is the touch
+_TOUCH_COLOR, _AWAY_COLOR = "#b5179e", "#E69F00"
 
 
 def draw_run(run: Run, path: Path) -> None:
@@ -44,13 +44,16 @@ def _compose(run: Run) -> Figure:
 
     scene = run.scene()
     states, slider = list(run.states()), list(run.slider())
+    if len({fraction for _, fraction in slider}) < 2:
+        slider = []  # one that stands still says nothing
     contact = _first(run.events, "contact")
     stopping = _first(run.events, "stopping")
     origin = next((event for event in (contact, stopping) if event is not None), None)
     first = next(iter(run.blocks), None)
     zero = origin.time if origin else 0.0 if first is None else first.time
     word = "touch" if contact else "stop" if stopping else "start"  # of what happens at zero
-    window = (zero - 0.3, _last(run.events, zero) + 0.2)
+    ends = [state.time for state in (*states[:1], *states[-1:])] or [zero - 0.3, zero + 1.0]
+    window = max(zero - 0.3, min(ends[0], zero)), min(_last(run.events, zero) + 0.2, max(ends[-1], zero + 0.1))
     stop = next((event for event in run.events if event.name == "stopping" and "contact" in event.details), None)
     contact = (stopping_contact(stop, run.events) if stop else _first(run.events, "contact_located", zero)) or contact
     figure = Figure(figsize=(12.0, 7.6 if slider else 6.4), layout="constrained")
@@ -60,7 +63,12 @@ def _compose(run: Run) -> Figure:
     if slider:
         _draw_slider(figure.add_subplot(grid[1, 0]), slider, zero, window)
     _draw_touch(figure.add_subplot(grid[-1, 0]), run, scene, zero, window)
-    figure.axes[-1].set_xlabel(f"time since the {'touch was seen' if contact else word} [ms]")
+    away, back = (_first(run.events, name, zero) for name in ("retreating", "retreated"))
+    if away is not None and away.time < window[1]:
+        until = window[1] if back is None else back.time
+        for axes in figure.axes:
+            axes.axvspan(1e3 * (away.time - zero), 1e3 * (until - zero), color=_AWAY_COLOR, alpha=0.15, lw=0)
+    figure.axes[-1].set_xlabel(f"time since the {'touch was seen' if contact else word} [ms]; shaded: moves away")
     if scene.arm is not None and states:
         axes = figure.add_subplot(grid[:, 1], projection="3d")
         _draw_arm(axes, scene, run.place_sensors(), states, contact, zero, word)
@@ -106,7 +114,7 @@ def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float, wind
     axes.plot(
         [1e3 * (t - zero) for t, _ in slider], [100.0 * f for _, f in slider], drawstyle="steps-post", color="0.2"
     )
-    axes.axvline(0.0, color="tab:red", lw=1.0)
+    axes.axvline(0.0, color=_TOUCH_COLOR, lw=1.0)
     axes.set_ylabel("speed slider [%]")
     axes.set_ylim(0.0, 105.0)
     axes.set_xlim(*(1e3 * (t - zero) for t in window))
@@ -135,16 +143,16 @@ def _draw_speeds(
         measured.append(state.qd)
     for joint in range(6):
         speeds = [qd[joint] for qd in measured]
-        axes.plot(times, speeds, lw=1.3, color=_JOINT_COLORS[joint], label=f"joint {joint + 1}")
-    axes.axvline(0.0, color="tab:red", lw=1.0)
+        axes.plot(times, speeds, lw=1.3, label=f"joint {joint + 1}")
+    axes.axvline(0.0, color=_TOUCH_COLOR, lw=1.0)
     style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
-    axes.text(0.0, 1.01, f"{word} ", color="tab:red", ha="right", **style)
+    axes.text(0.0, 1.01, f"{word} ", color=_TOUCH_COLOR, ha="right", **style)
     for time, words in _marks(events, zero, window):
         axes.axvline(1e3 * (time - zero), color="0.6", lw=0.7, ls=":")
         axes.text(1e3 * (time - zero), 1.01, f" {words}", color="0.3", ha="left", **style)
     axes.set_ylabel("joint speed [rad/s]")
     axes.set_xlim(*(1e3 * (t - zero) for t in window))
-    axes.legend(fontsize=7, ncols=2, loc="best")
+    axes.legend(ncols=3, loc="best")
     axes.grid(alpha=0.3)
 
 
@@ -161,11 +169,11 @@ def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[fl
             levels.append(read(sensor, frame).level)
     for item in scene.sensors:
         axes.plot(*series[item.sensor.name], lw=1.2, label=item.sensor.name)
-        axes.axhline(item.sensor.thresholds.touch_level, color="tab:red", lw=0.8, ls="--")
-        axes.axhline(item.sensor.thresholds.release_level, color="0.5", lw=0.8, ls="--")
-    axes.set_ylabel("touch level (dashed: on, off)")
+        axes.axhline(item.sensor.thresholds.touch_level, color=_TOUCH_COLOR, lw=0.8, ls="--")
+        axes.axhline(item.sensor.thresholds.release_level, color="0.5", lw=0.8, ls=":")
+    axes.set_ylabel("touch level (dashed: on, dotted: off)")
     axes.set_xlim(*(1e3 * (t - zero) for t in window))
-    axes.set_ylim(-0.02, 1.0)
+    axes.set_ylim(0.0, 1.0)
     axes.legend(fontsize=7)
     axes.grid(alpha=0.3)
 
@@ -185,7 +193,7 @@ def _draw_arm(
     assert scene.arm is not None
     arm = arm_model(scene.arm.model)
     touched = min(states, key=lambda state: abs(state.time - zero))
-    for state, colour, label in ((states[-1], "0.7", "at the end"), (touched, "tab:blue", f"at the {word}")):
+    for state, colour, label in ((states[-1], "0.7", "at the end"), (touched, "#0072B2", f"at the {word}")):
         axes.plot(*zip(*skeleton(arm, state.q), strict=True), "-o", ms=3, lw=3, color=colour, label=label)
     label = "sensor: ends and middle"
     for placed in sensors:
@@ -193,13 +201,13 @@ def _draw_arm(
         for u in (0.0, 0.5, 1.0):
             frustum = placed.frustum.frustum
             ring = [base_link.apply(placed.frustum.point(u * frustum.slant, frustum.wrap * k / 48)) for k in range(49)]
-            axes.plot(*zip(*ring, strict=True), lw=0.8, color="tab:green", label=label)
+            axes.plot(*zip(*ring, strict=True), lw=0.8, color="#009E73", label=label)
             label = "_"  # once is enough
         if contact is not None and contact.details.get("sensor") == placed.name:
             point = base_link.apply(_vector(contact, "point"))
             normal = base_link.rotate(_vector(contact, "normal"))
-            axes.scatter(*([value] for value in point), color="tab:red", s=30, label="touch and normal")
-            axes.quiver(*point, *normal, length=0.2, color="tab:red", lw=1.5)
+            axes.scatter(*([value] for value in point), color=_TOUCH_COLOR, s=30, label="touch and normal")
+            axes.quiver(*point, *normal, length=0.2, color=_TOUCH_COLOR, lw=1.5)
     axes.set_box_aspect((1, 1, 1), zoom=0.88)  # room for the label of z, which the layout does not know
     reach = 0.6 * (abs(arm.a[1]) + abs(arm.a[2]))
     middle = [0.5 * (min(c) + max(c)) for c in zip(*skeleton(arm, touched.q), strict=True)]

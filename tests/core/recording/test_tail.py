@@ -8,7 +8,7 @@ import pytest
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
-from coneskin.view.live_run import _RecordingTail
+from coneskin.core.recording.tail import RecordingTail
 
 HEADER, SKIN, EVENT = 20, 1, 10
 ALWAYS = frozenset({HEADER, EVENT})
@@ -20,7 +20,7 @@ def blocks(count: int, since: float, kind: int = SKIN) -> list[Block]:
 
 def test_it_reads_each_block_once_as_it_comes(tmp_path: Path) -> None:
     path = tmp_path / "run.rec"
-    with Recorder(path) as recorder, closing(_RecordingTail(path, 60.0, ALWAYS)) as tail:
+    with Recorder(path) as recorder, closing(RecordingTail(path, 60.0, ALWAYS)) as tail:
         assert tail.read() == []
         recorder.write(Block(HEADER, 0.0, b"{}"), flush=True)
         first = blocks(30, 1.0)
@@ -43,7 +43,7 @@ def test_a_chunk_that_is_not_whole_yet_is_waited_for(tmp_path: Path) -> None:
         written = whole.read_bytes()
     for cut in (24, 40, 24 + 68, len(written) - 1):
         path.write_bytes(written[:cut])
-        with closing(_RecordingTail(path, 60.0, ALWAYS)) as tail:
+        with closing(RecordingTail(path, 60.0, ALWAYS)) as tail:
             assert tail.read() == []
             with path.open("ab") as file:
                 file.write(written[cut:])
@@ -52,7 +52,7 @@ def test_a_chunk_that_is_not_whole_yet_is_waited_for(tmp_path: Path) -> None:
 
 def test_it_goes_on_in_the_next_file(tmp_path: Path) -> None:
     path = tmp_path / "run.rec"
-    with Recorder(path, part_size=2000) as recorder, closing(_RecordingTail(path, 1e9, ALWAYS)) as tail:
+    with Recorder(path, part_size=2000) as recorder, closing(RecordingTail(path, 1e9, ALWAYS)) as tail:
         found: list[Block] = []
         for turn in range(40):
             recorder.write(*(Block(SKIN, turn + 0.001 * k, bytes(200 + k)) for k in range(20)), flush=True)
@@ -69,7 +69,7 @@ def test_of_a_long_recording_it_reads_the_end_and_the_events(tmp_path: Path) -> 
             recorder.write(*blocks(10, float(second)), flush=True)
             if second % 100 == 0:
                 recorder.write(Block(EVENT, second + 0.5, b"[]"), flush=True)
-    with closing(_RecordingTail(path, 10.0, ALWAYS)) as tail:
+    with closing(RecordingTail(path, 10.0, ALWAYS)) as tail:
         found = tail.read()
     assert [block.time for block in found if block.kind != SKIN][:3] == [0.0, 100.5, 200.5]
     assert min(block.time for block in found if block.kind == SKIN) >= 289.0
@@ -84,7 +84,7 @@ def test_damage_is_passed_over(tmp_path: Path) -> None:
     second = data.index(b"\xa7CSK", 30)
     data[second : second + 20] = bytes(20)
     path.write_bytes(data)
-    with closing(_RecordingTail(path, 1e9, ALWAYS)) as tail:
+    with closing(RecordingTail(path, 1e9, ALWAYS)) as tail:
         found = tail.read()
         assert tail.damaged > 0
     assert {int(block.time) for block in found if block.kind == SKIN} == {0, 2, 3, 4}
@@ -95,4 +95,4 @@ def test_what_is_no_recording_is_refused(content: bytes, tmp_path: Path) -> None
     path = tmp_path / "run.rec"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match="no recording that can be followed"):
-        _RecordingTail(path, 1.0, ALWAYS)
+        RecordingTail(path, 1.0, ALWAYS)
