@@ -1,15 +1,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.impact.permissible_speed import taylor_integrator
-from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
+
+#: as exactly as it can
+integrate = partial(taylor_integrator.integrate, tolerance=1e-13)
 
 WALL = StruckBody(math.inf)
 ELASTIC = Padding(loss=0.0)
@@ -186,3 +189,26 @@ def test_a_padding_that_follows_again_is_bottomed_out_only_beyond_its_thickness(
     run.mode, run.s = taylor_integrator._RELEASED, part * run.law.end
     run._switch("follow")
     assert run.mode == mode
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    speed=st.floats(0.01, 5.0),
+    arm=st.floats(0.0, 3.0).map(lambda n: 10.0**n),
+    body=st.floats(-3.0, 1.0).map(lambda n: 10.0**n),
+    loss=st.sampled_from([0.0, 0.3, 2.0]),
+    support=st.sampled_from([0.0, 20e3]),
+    hard=st.floats(4.0, 7.0).map(lambda n: 10.0**n),
+)
+def test_without_a_wish_a_contact_is_exact_to_a_millionth(
+    speed: float, arm: float, body: float, loss: float, support: float, hard: float
+) -> None:
+    driven = DrivenArm(speed, arm, arm * 1e4, 2e2 * arm, 0.012, 3.0)
+    struck = StruckBody(body, 75e3, support, 0.6 * math.sqrt(support * body))
+    contact = TwoMassContact(driven, struck, Padding(hard_stiffness=hard, loss=loss))
+    found, exact = taylor_integrator.integrate(contact, 0.05), integrate(contact, 0.05)
+    assert found.peak == pytest.approx(exact.peak, rel=1e-6)
+    assert found.last == pytest.approx(exact.last, abs=1e-6 * exact.peak)
+    assert found.deepest == pytest.approx(exact.deepest, rel=1e-6)
+    assert found.impulse == pytest.approx(exact.impulse, rel=1e-6)
+    assert len(found.stretches) <= len(exact.stretches)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["HORIZON", "POINTS", "expand", "integrate", "reach"]
 
 _SERIES_ORDER = 18
-_SERIES_TOLERANCE = 1e-14  # of the last coefficients of a step, relative to the largest
+_SERIES_SHARE = 0.1  # of the tolerance, for the last coefficients of a step over the largest
 
 
 def expand(model: TwoMassContact, start: ContactState) -> tuple[list[float], ...]:
@@ -72,14 +72,14 @@ def expand(model: TwoMassContact, start: ContactState) -> tuple[list[float], ...
     return s, w, x, v, f
 
 
-def reach(series: Sequence[Sequence[float]]) -> float:
+def reach(series: Sequence[Sequence[float]], tolerance: float) -> float:
     """Return how far series reach [s]: until the last two terms of the first four would count."""
     longest = math.inf
     for terms in series[:4]:
         scale = max(abs(terms[0]), abs(terms[1]) * 1e-9, 1e-12)
         for power in (_SERIES_ORDER, _SERIES_ORDER - 1):
             if last := abs(terms[power]):
-                longest = min(longest, (_SERIES_TOLERANCE * scale / last) ** (1.0 / power))
+                longest = min(longest, (_SERIES_SHARE * tolerance * scale / last) ** (1.0 / power))
     return longest
 
 
@@ -189,20 +189,25 @@ def _rule() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
 
 #: s after which a contact is no transient one any more; ISO/TS 15066, 5.5.5.3
 HORIZON = 0.5
-_MAX_TAIL = 1e-9  # of the last term of an implicit step, relative to the largest
+_MIN_TAIL = 1e-9  # of the last term of an implicit step, relative to the largest: less changes nothing
 _MIN_GAIN = 12.0  # times as long as one of the series an implicit step must be: so much more it costs
-_FADED_EXPONENT = 20.0  # the fastest motion is over when it has fallen by this exponent
-_STEPS_TO_IMPLICIT = 24  # steps without an event before an implicit one is tried
+_FADED_EXPONENT = 20.0  # the fastest motion is over when it has fallen by this exponent, or to the tolerance
+_STEPS_TO_IMPLICIT = 6  # steps without an event before an implicit one is tried
 _MAX_STEPS = 2_000_000
-_SETTLED_SHARE = 1e-11  # of the force at rest, below which a vibration is over
-_SETTLED_COARSE = 1e-4  # the same, where only peak and rest are asked for
+_SETTLED_SHARE = 1e-11  # of the force at rest, below which a vibration is over, or a tenth of the tolerance
+_SETTLED_COARSE = 1e-4  # of the force at rest, where only peak and rest are asked for
 _FREE, _SOFT, _HARD, _RELEASED = range(4)  #: apart; padding; bottomed out; receding faster than the padding follows
 
 _Step = tuple[Sequence[Sequence[float]], float, tuple[float, float, float, float] | None]
 
 
 def integrate(
-    model: TwoMassContact, horizon: float = HORIZON, *, keep: bool = True, stop_above: float = math.inf
+    model: TwoMassContact,
+    horizon: float = HORIZON,
+    *,
+    keep: bool = True,
+    stop_above: float = math.inf,
+    tolerance: float = 1e-6,
 ) -> ContactCourse:
     """Return the course of a contact from the first touch on.
 
@@ -211,18 +216,24 @@ def integrate(
         horizon: until when [s].
         keep: False to keep no stretches, only what is read off them.
         stop_above: peak force at which to look no further [N].
+        tolerance: of forces and ways, relative to the largest; limits are known to a tenth.
 
     Raises:
         ArithmeticError: the values are so far apart that two million steps do not reach the horizon.
     """
-    return _Integration(model, horizon, keep, stop_above).run()
+    return _Integration(model, horizon, keep, stop_above, tolerance).run()
 
 
 class _Integration:
     """State of one integration."""
 
-    def __init__(self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float) -> None:
+    def __init__(
+        self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float, tolerance: float = 1e-6
+    ) -> None:
         self.model, self.horizon, self.keep, self.stop_above = model, horizon, keep, stop_above
+        self.tolerance, self.max_tail = tolerance, max(tolerance, _MIN_TAIL)
+        self.faded_exponent = min(-math.log(tolerance), _FADED_EXPONENT)
+        self.settled_share = max(_SETTLED_SHARE, 0.1 * tolerance) if keep else _SETTLED_COARSE
         arm, body, law = model.arm, model.body, model.law
         self.arm_mobility, self.body_mobility = 1.0 / arm.mass, 1.0 / body.mass  # 0 of an infinite mass
         self.law = law
@@ -254,7 +265,7 @@ class _Integration:
         """Return the step of the Taylor series."""
         start = self._state()
         series = expand(self.model, start)
-        self.pace = reach(series)
+        self.pace = reach(series, self.tolerance)
         h = min(self.pace, room)
         self.calm += 1
         self.faded += 0.5 * h * self._friction(start.elastic)
@@ -268,15 +279,15 @@ class _Integration:
     def _by_collocation(self, room: float) -> _Step | None:
         """Return a step of many times the length, where the fastest motion has died away; None where it has not."""
         if self.mode not in (_SOFT, _HARD) or (
-            not self.ahead and (self.calm < self.patience or self.faded < _FADED_EXPONENT)
+            not self.ahead and (self.calm < self.patience or self.faded < self.faded_exponent)
         ):
             return None
         start = self._state()
         tried = self.ahead or _MIN_GAIN * self.pace  # shorter ones cost more than the series
         while (h := min(tried, room)) >= _MIN_GAIN * self.pace:
             found = _collocate(self.model, start, h)
-            better = 0.85 * h * (_MAX_TAIL / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
-            if found and found.tail <= _MAX_TAIL:
+            better = 0.85 * h * (self.max_tail / max(found.tail, 1e-30)) ** (1.0 / POINTS) if found else 0.1 * h
+            if found and found.tail <= self.max_tail:
                 self.ahead = max(min(better, 4.0 * h), h if h < tried else 0.0)
                 return found.series, h, found.end
             tried = min(better, 0.5 * h)
@@ -395,7 +406,7 @@ class _Integration:
             energy += 0.5 * arm.stiffness * lag * lag + 0.5 * (self.w + self.v) ** 2 / self.arm_mobility
         if self.body_mobility:
             energy += 0.5 * body.support * (self.x - x) ** 2 + 0.5 * self.v**2 / self.body_mobility
-        if math.sqrt(2.0 * energy * slope) > (_SETTLED_SHARE if self.keep else _SETTLED_COARSE) * force:
+        if math.sqrt(2.0 * energy * slope) > self.settled_share * force:
             return False
         self.impulse += force * (self.horizon - self.time)
         if self.keep:
