@@ -22,6 +22,8 @@ COMPILED = {
     "robot": ("robot/driver/*", "robot/stop/*", "robot/guard/*", "robot/guard/*/*", "robot/ur/*"),
     "motion": ("robot/arm/*", "robot/reaction/*"),
 }
+#: core/recording stays Python: compiled, it decodes chunks no faster (76 ms for a run of 60 s, 69 as it is, 45 of them
+#: zlib's), and a compiled generator that is dropped half-way runs no ``finally``, so its ``with`` leaves files open
 #: what stays Python there: an enumeration with a __new__, empty named tuples, protocols, a keyword of C as a name
 UNFIT = {"journal", "messages", "deadman", "protocol"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays

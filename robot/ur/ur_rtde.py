@@ -120,7 +120,7 @@ class UrArm:
         try:
             import rtde_control  # type: ignore[import-not-found,unused-ignore]
         except ImportError as exc:
-            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12)") from exc
+            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12 on x86-64)") from exc
         self.wheel = rtde_control
         with _rtde_errors(f"connecting ur_rtde to {self.host}"):
             self.control = rtde_control.RTDEControlInterface(self.host)
