@@ -117,8 +117,8 @@ def main() -> None:
             words = legend(found)
     show("s, least / median", ["", "until active", *(f"{key}, processor" for key in _COLUMNS[1:])], rows)
     width = max(len(line) for _, line in pictures)
-    show(f"a letter is {1e3 * _STEP:g} ms", ["", ""], [[name, line.ljust(width) + "|"] for name, line in pictures])
-    print(", ".join(f"{letter} {word}" for letter, word in words.items()))
+    said = ", ".join(f"{letter} {word}" for letter, word in words.items())
+    show(f"a letter is {1e3 * _STEP:g} ms: {said}", ["", ""], [[name, f"{line:{width}}|"] for name, line in pictures])
 
 
 _COLUMNS = ("active", "program", "guard", "skin", "driver", "all")
