@@ -334,7 +334,8 @@ def test_the_prose_is_plain() -> None:
     assert len(long) <= LONG_SENTENCES * len(found)
 
 
-def test_the_drawing_is_what_its_script_draws() -> None:
-    code = "from draw_touch_flow import TARGET, drawing; assert drawing() == TARGET.read_text(encoding='utf-8')"
+@pytest.mark.parametrize("script", ["draw_touch_flow", "draw_guard_phases"])
+def test_the_drawing_is_what_its_script_draws(script: str) -> None:
+    code = f"from {script} import TARGET, drawing; assert drawing() == TARGET.read_text(encoding='utf-8')"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT / "scripts", timeout=60)
-    assert done.returncode == 0, "python scripts/draw_touch_flow.py draws it anew"
+    assert done.returncode == 0, f"python scripts/{script}.py draws it anew"

@@ -87,10 +87,10 @@ HOT = {
     "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares vectors workspace",
     "robot/reaction": "retreat types",
-    "robot/guard": "core arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
+    "robot/guard": "core phase arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",
     "robot/guard/motion": "motion_away setpoint_stream",
-    "robot/stop": "stop_monitor",
+    "robot/stop": "state_age stop_monitor",
     "robot/ur": "driver_process state_reader ur_rtde",
 }
 

@@ -102,7 +102,7 @@ class Guarded:
                 drain(arm)
                 if core.phase is Phase.LATCHED and CLOCK() >= reset_at:  # refused until nothing stands against it
                     reset_at = CLOCK() + RESET_PERIOD
-                    core.feed(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.stop_number), [])
+                    core.feed(Block(BlockKind.RESET, CLOCK(), b"%d 1" % core._arm.supervision.stop), [])
             gc.enable()
             loop._report()
             loop._close()

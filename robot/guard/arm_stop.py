@@ -10,7 +10,6 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.standstill import WATCH_DURATION, StandstillWatch
 from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-from .signals.contact import Contact
 from .signals.journal import EventName, Outputs, emit
 
 __all__ = ["ArmStop"]
@@ -26,8 +25,6 @@ class ArmStop:
         paths: the stop paths that there are, in the order of their use.
 
     Attributes:
-        number: counted from 1. A motion away and its end belong to the stop before.
-        why: its cause, and what came of it.
         paths: those that are left.
         used: paths of the newest stop.
         first_was_enough: True where the newest stop came to a standstill by the first path alone.
@@ -35,8 +32,6 @@ class ArmStop:
     """
 
     def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
-        self.number = 0
-        self.why = ""
         self.paths = paths
         self.used: tuple[StopPath, ...] = ()
         self.first_was_enough = False
@@ -47,15 +42,6 @@ class ArmStop:
         self._order = paths  # of the stop under way
         self._monitor: StopMonitor | None = None
         self._protective_at = 0.0  # when it was last used
-
-    @property
-    def under_way(self) -> bool:
-        """True from a stop until the arm is measured standing."""
-        return self._monitor is not None
-
-    def again(self, what: str) -> str:
-        """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""
-        return f"{self.why.partition('; then ')[0]}; then {what}"
 
     def send(self, command: StopProgram | EndReaction, out: Outputs) -> None:
         """Send a stop by its first path. Another path than the driver process has the command's deceleration."""
@@ -82,12 +68,6 @@ class ArmStop:
             now, speed, self._order, limits.escalate, budget, limits.standstill, limits.arm_silence
         )
         self.watch.end()
-
-    def report(self, now: float, why: str, contact: Contact | None, out: Outputs) -> None:
-        """Report a stop that was sent at a host time [s]: its cause, and the contact for which it was, if any."""
-        self.why = why
-        named = {} if contact is None else {"contact": contact.summary()}
-        emit(out, EventName.STOPPING, now, why=why, stop=self.number, **named)
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool) -> None:
         """Drop stop paths that are lost, or that this stop must not count on, and use the next one at once."""
@@ -138,26 +118,16 @@ class ArmStop:
 
     def insist(self, state: ControllerState, deceleration: float, out: Outputs) -> None:
         """Repeat a protective stop that the controller's safety system does not show, though the arm stands."""
-        if not self._unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
+        if not self.unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
             return
         if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
             self._protective_at = state.time
             out.append(UseStopPath(StopPath.PROTECTIVE, deceleration))
 
-    def stay(self, why: str, state: ControllerState) -> None:
+    def stay(self, state: ControllerState) -> None:
         """Let the arm stand: at once where no other program can start, else to the end of a watch."""
-        self.why = why
-        self.watch.begin(state.time, WATCH_DURATION if self._others_move or self._unconfirmed(state) else 0.0)
+        self.watch.begin(state.time, WATCH_DURATION if self._others_move or self.unconfirmed(state) else 0.0)
 
-    def latched(self, state: ControllerState, out: Outputs) -> bool:
-        """Tell whether the arm has kept standing for long enough to be called latched, and report that it is."""
-        if not (self.watch.confirmed or state.stopped_by_safety):
-            return False
-        if self._unconfirmed(state):
-            self.why += "; the controller does not show the protective stop"
-        emit(out, EventName.LATCHED, state.time, why=self.why, stop=self.number)
-        return True
-
-    def _unconfirmed(self, state: ControllerState) -> bool:
+    def unconfirmed(self, state: ControllerState) -> bool:
         """Tell whether the newest stop took a protective stop that the controller does not show."""
         return StopPath.PROTECTIVE in self.used and not state.stopped_by_safety

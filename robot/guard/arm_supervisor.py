@@ -1,21 +1,15 @@
 """Supervisor of the arm under guard: it stops it, sees it stand, moves it away and latches. Pure.
 
-    ACTIVE --stop--> STOPPING --standing--> RETREATING --made, or over--> HALTING --standing--> LATCHED
-     |  ^              ^ |                                                                      |    ^
-     |  +-- free --+   | +-- standing, and no motion is wanted or possible ---------------------|----+
-     +-- slow --> SLOWED --not slower, too long, a harder touch, a fault                        |
-                       +---------- something moves the arm again, or no state shows it ---------+
-
-A stop counts when measured joint speed says so, and is not given up before. An arm that other programs may move is
-latched only at the end of a watch in which none did. Only a manual reset leaves LATCHED for good, and the arm is
-monitored until the guard is active again.
+What is decided is one value, and how it changes is one table (``phase``). Here are the senses and the hands of that:
+what is measured becomes a cue, and what follows from it becomes commands.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ArmModel
@@ -30,7 +24,7 @@ from coneskin.robot.stop.state_age import StateAge
 from .activation import ControllerNeeds
 from .arm_stop import ArmStop
 from .motion.motion_away import MotionAway
-from .phase import Phase
+from .phase import Act, Cue, Phase, Supervision, transition
 from .signals.contact import Contact, TouchRecord
 from .signals.journal import TOUCH_CAUSE, EventName, Outputs, emit
 from .speed.speed_reduction import SpeedReduction
@@ -41,6 +35,8 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
+
+_PLACE_TIME: Final = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
 
 
 class ArmSupervisor:
@@ -60,7 +56,7 @@ class ArmSupervisor:
 
     Attributes:
         model, driver, heartbeat: as given.
-        phase: where it is.
+        supervision: all that is decided about the arm.
         state: newest measured state, or None before the first.
         backup_ready: True once the process that stops the arm without this one is ready: driver process or watchdog.
         internal_control: True where the driver process moves the arm.
@@ -83,7 +79,7 @@ class ArmSupervisor:
         heartbeat: ControllerHeartbeat | None = None,
         speed_limit: SpeedLimit | None = None,
     ) -> None:
-        self.phase = Phase.STARTING
+        self.supervision = Supervision()
         self.state: ControllerState | None = None
         self.driver = driver
         self.backup_ready = False
@@ -97,17 +93,16 @@ class ArmSupervisor:
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
-        self._away = MotionAway(planner, self.internal_control)
+        self._away = MotionAway(planner)
         self.state_age = StateAge(limits.arm_silence)
         self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
-        self._ending = False
         self._sent = False  # the stop for a touch whose event comes next
 
     @property
-    def stop_number(self) -> int:
-        """Number of the newest stop, counted since the guard's start, 0 before the first."""
-        return self._stop.number
+    def phase(self) -> Phase:
+        """Phase in which the arm is."""
+        return self.supervision.phase
 
     @property
     def needs(self) -> ControllerNeeds:
@@ -165,7 +160,8 @@ class ArmSupervisor:
 
     def activate(self, out: Outputs) -> None:
         """React from now on. The program may move the arm."""
-        self.phase, self._reaction = Phase.ACTIVE, self._rules.default
+        self.supervision, _ = transition(self.supervision, Cue.ACTIVATED)
+        self._reaction = self._rules.default
         self._stop.watch.forget()
         if self._speed_limit is not None:
             self._speed_limit.forget()
@@ -193,51 +189,44 @@ class ArmSupervisor:
             if reaction.kind == "slow" and self.speed_reduction.begin(
                 now, self.state, reaction, self._limits, [contact.on_link()], out
             ):
-                self.phase = Phase.SLOWED
+                self._follow(now, Cue.SLOWED, "", out)
             else:
-                self._stop_now(now, TOUCH_CAUSE, True, out, contact)
+                self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
             return
         reaction, away = touches.update(contact), self._away
         if phase is Phase.SLOWED and reaction.kind != "slow":
             self._reaction = reaction
-            self._stop_now(now, TOUCH_CAUSE, True, out, contact)
+            self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
         elif away.yields:
             if reaction.kind not in ("slow", "comply", self._reaction.kind):
                 self._reaction = reaction
-                self._halt(now, TOUCH_CAUSE, out, contact)
-        elif away.under_way and began:
+                self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
+        elif phase is Phase.RETREATING and began:
             away.oppose()
-            self._halt(now, TOUCH_CAUSE, out, contact)
+            self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
 
     def feed_contacts(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
         """Take what the newest frames say of every touch that there is, at a host time [s]."""
         for contact in contacts:
             self.touch(now, contact, False, out)
-        self._touches.feed(contacts, self.phase is Phase.STOPPING)
+        self._touches.feed(contacts, self.phase in (Phase.STOPPING, Phase.PLACING) and not self.supervision.moved_away)
         away, state = self._away, self.state
-        if away.under_way and state is not None and contacts:
+        if self.phase is Phase.RETREATING and state is not None and contacts:
             over = away.resisted(state, now, self._touches.contacts)
             if over is not None:
-                self._end_motion(now, over, out)
+                self._end_motion(now, Cue.OVER, over, out)
 
     def abandon_motion(self, now: float, why: str, out: Outputs) -> None:
         """End the motion away at a host time [s], and let none follow: it cannot be supervised any more."""
-        self._end_motion(now, self._away.abandoned(why), out)
-        self._away.permitted = False
+        self._end_motion(now, Cue.ABANDONED, self._away.abandoned(why), out)
 
     def fault(self, now: float, why: str, out: Outputs) -> None:
         """Stop because something is wrong, and do not move any more."""
-        if self.phase in (Phase.ACTIVE, Phase.SLOWED):
-            self._stop_now(now, why, False, out)
-        elif self.phase is Phase.RETREATING:
-            self._halt(now, why, out)
-            self._away.permitted = False
-        elif self.phase.stopping:
-            self._stop.why, self._away.permitted = self._stop.again(why), False
+        self._follow(now, Cue.FAULTED, why, out)
 
     def end(self, now: float, out: Outputs) -> None:
         """Leave the speed slider as it was found once the arm stands latched: the guard ends, at a host time [s]."""
-        self._ending = True
+        self.supervision = replace(self.supervision, ending=True)
         if self.phase in (Phase.STARTING, Phase.LATCHED):
             self._put_slider_back(now, out)
 
@@ -248,59 +237,72 @@ class ArmSupervisor:
     def sample(self, state: ControllerState, out: Outputs) -> None:
         """Take a measured state."""
         self.state = state
-        stop, measured_at = self._stop, self.state_age.feed(state)
+        stop, measured_at, phase = self._stop, self.state_age.feed(state), self.supervision.phase
         self._away.feed(measured_at, state)
-        if self.state_age.stepped:
-            self._away.bar("the controller's clock has stepped")
-        if stop.under_way:
-            if self.state_age.fresh:
-                self._brake(state, measured_at, out)
-        elif self._away.under_way:
+        if state.stopped_by_safety or not state.powered:
+            self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
+        elif self.state_age.stepped:
+            self._bar("the controller's clock has stepped")
+        if phase.brakes:
+            if self.state_age.fresh and stop.stands(state, measured_at, out):
+                self.speed_reduction.put_back(state.time, out)
+                self._decide(state, state.time + _PLACE_TIME, out)
+        elif phase is Phase.RETREATING:
             self._move(state, out)
-        elif self._speed_limit is not None and self.phase is Phase.ACTIVE:
-            if why := self._speed_limit.sample(state, self.speed_reduction.known(state.time), out):
-                self._stop_now(state.time, why, False, out)
-        elif self.phase is Phase.SLOWED:
+        elif phase is Phase.ACTIVE:
+            if self._speed_limit is not None and (
+                why := self._speed_limit.sample(state, self.speed_reduction.known(state.time), out)
+            ):
+                self._follow(state.time, Cue.FAULTED, why, out)
+        elif phase is Phase.SLOWED:
             self.speed_reduction.sample(state, self._touches.contacts)
         elif stop.watch.moved(state, bool(self._touches.contacts)):
-            self._stop_now(state.time, stop.again(stop.watch.why), False, out)
-        elif stop.watch.under_way and self._away.undecided:
-            self._decide(state, out)
-        elif stop.watch.under_way and self.phase is not Phase.LATCHED:
+            self._follow(state.time, Cue.MOVED, stop.watch.why, out)
+        elif phase is Phase.PLACING:
+            self._decide(state, self.supervision.decide_by, out)
+        elif phase is Phase.STANDING:
             stop.insist(state, self._reaction.deceleration, out)
             self._latch(state, out)
 
     def poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
-        stop = self._stop
-        if stop.under_way:
+        stop, phase = self._stop, self.supervision.phase
+        if phase.brakes:
             stop.escalate(now, self._reaction.deceleration, self.state, out)
             self.speed_reduction.note_stop(stop.used)
-        elif self.phase is Phase.SLOWED:
+        elif phase is Phase.SLOWED:
             if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
                 approach = self.speed_reduction.approach
-                self._stop_now(now, why, False, out, self._touches.find(approach.exceeded if approach else 0))
+                contact = self._touches.find(approach.exceeded if approach else 0)
+                self._follow(now, Cue.FAULTED, why, out, contact)
             elif self.speed_reduction.over(now):
-                self.phase = Phase.ACTIVE
+                self._follow(now, Cue.FREED, "", out)
                 self.speed_reduction.put_back(now, out)
                 emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)
-        elif stop.watch.under_way and self.state_age.silent(now):
-            self._stop_now(now, stop.again("the controller fell silent"), False, out)
+        elif phase.stands and self.state_age.silent(now):
+            self._follow(now, Cue.MOVED, "the controller fell silent", out)
 
     # ---- what it does
 
-    def _stop_now(self, now: float, why: str, may_move: bool, out: Outputs, contact: Contact | None = None) -> None:
-        self._begin(now, Phase.STOPPING, StopProgram(self._reaction.deceleration), out)
-        self._touches.placed = ()
-        self._away.prepare(self.state, may_move)
-        self._stop.number += 1
-        self._stop.report(now, why, contact, out)
+    def _follow(self, now: float, cue: Cue, what: str, out: Outputs, contact: Contact | None = None) -> None:
+        """Take a cue, and do at once what follows from it: send the stop, then report it."""
+        then, act = transition(self.supervision, cue, what)
+        if act is Act.STOP:
+            self._begin_stop(now, StopProgram(self._reaction.deceleration), out)
+            self._touches.placed = ()
+            self._away.prepare(self.state)
+        elif act is Act.HALT:
+            self._begin_stop(now, EndReaction(self._reaction.deceleration), out)
+        self.supervision = then
+        if act is Act.STOP or act is Act.HALT:
+            named = {} if contact is None else {"contact": contact.summary()}
+            emit(out, EventName.STOPPING, now, why=then.why, stop=then.stop, **named)
 
-    def _halt(self, now: float, why: str, out: Outputs, contact: Contact | None = None) -> None:
-        self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
-        self._stop.report(now, why, contact, out)
+    def _end_motion(self, now: float, cue: Cue, over: Done, out: Outputs) -> None:
+        self._begin_stop(now, EndReaction(self._reaction.deceleration), out)
+        self.supervision, _ = transition(self.supervision, cue, self._away.report(now, over, out))
 
-    def _begin(self, now: float, phase: Phase, command: StopProgram | EndReaction, out: Outputs) -> None:
+    def _begin_stop(self, now: float, command: StopProgram | EndReaction, out: Outputs) -> None:
         if self._sent:
             self._sent = False
         else:
@@ -310,46 +312,50 @@ class ArmSupervisor:
         state = self.state
         speed = None if state is None or self.state_age.silent(now) else state.speed
         self._stop.begin(now, speed, command.deceleration)
-        self.phase = phase
 
-    def _brake(self, state: ControllerState, measured_at: float, out: Outputs) -> None:
-        if self._stop.stands(state, measured_at, out):
-            self.speed_reduction.put_back(state.time, out)
-            self._away.await_place(state.time)
-            self._decide(state, out)
+    def _bar(self, why: str) -> None:
+        """Let nothing of ours move the arm before the next stop. Who ends a motion under way names the fault."""
+        if not self.supervision.barred:
+            self.supervision = replace(self.supervision, barred=why)
 
-    def _decide(self, state: ControllerState, out: Outputs) -> None:
+    def _decide(self, state: ControllerState, decide_by: float, out: Outputs) -> None:
         """Decide what the standing arm does. The place of a touch may need a while to become certain."""
-        stopping, enough = self.phase is Phase.STOPPING, self._stop.first_was_enough
         if stale := self.state_age.stale(state.time):
-            self._away.bar(stale)
-        decision = self._away.decide(state, self._reaction, stopping, enough, self._touches, out)
+            self._bar(stale)
+        now, enough = self.supervision, self._stop.first_was_enough
+        mover = "the driver" if self.internal_control else "a program"
+        bar = now.barred or ("" if enough else f"{mover} did not stop the arm")
+        decision = self._away.decide(
+            state, self._reaction, now.may_move, now.moved_away, bar, decide_by, self._touches, out
+        )
         self._reaction = decision.reaction
         if decision.waits:
+            self.supervision, _ = transition(now, Cue.WAITS, decide_by=decide_by)
             return
         self._stop.watch.end()
         if decision.begun:
-            self.phase = Phase.RETREATING
+            self.supervision, _ = transition(self.supervision, Cue.MOVES_AWAY)
             self._move(state, out)
         else:
-            why = self._stop.why
-            self._stop.stay(f"{why}; {decision.refusal}" if decision.refusal else why, state)
+            self._stop.stay(state)
+            self.supervision, _ = transition(self.supervision, Cue.STAYS, decision.refusal)
             self._latch(state, out)
 
     def _move(self, state: ControllerState, out: Outputs) -> None:
-        over = self._away.update(state, self._touches.contacts, out)
-        if over is not None:
-            self._end_motion(state.time, over, out)
-
-    def _end_motion(self, now: float, over: Done, out: Outputs) -> None:
-        self._begin(now, Phase.HALTING, EndReaction(self._reaction.deceleration), out)
-        self._stop.why += f"; {self._away.report(now, over, out)}"
+        if not self.supervision.barred:
+            over = self._away.update(state, self._touches.contacts, out)
+            if over is not None:
+                self._end_motion(state.time, Cue.OVER, over, out)
 
     def _latch(self, state: ControllerState, out: Outputs) -> None:
-        if self._stop.latched(state, out):
-            self.phase = Phase.LATCHED
+        """Latch an arm that has kept standing for long enough, and report it."""
+        stop = self._stop
+        if stop.watch.confirmed or state.stopped_by_safety:
+            what = "the controller does not show the protective stop" if stop.unconfirmed(state) else ""
+            self.supervision, _ = transition(self.supervision, Cue.LATCHES, what)
+            emit(out, EventName.LATCHED, state.time, why=self.supervision.why, stop=self.supervision.stop)
             self._put_slider_back(state.time, out)
 
     def _put_slider_back(self, now: float, out: Outputs) -> None:
-        if self._ending and self._speed_limit is not None:
+        if self.supervision.ending and self._speed_limit is not None:
             self._speed_limit.end(now, self.speed_reduction.known(now), out)

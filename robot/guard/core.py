@@ -213,7 +213,7 @@ class GuardCore:
     def _feed_skin(self, block: Block, out: Outputs) -> None:
         if out is not self._out:  # the same one with every input
             self._out, self._alarm = out, partial(self._stop, out)
-        guarded = self._arm is not None and self._arm.phase is Phase.ACTIVE
+        guarded = self._arm is not None and self._arm.supervision.phase is Phase.ACTIVE
         for event in self._stream.feed(block.payload, block.time, self._alarm if guarded else None):
             self._feed_event(event, out)
         if self._contacts:
@@ -419,7 +419,7 @@ class GuardCore:
         """Take a manual reset, which forgives one stop: the one that a person has looked at."""
         numbers = block.payload.split()
         stop, request = map(int, numbers) if len(numbers) == 2 and all(map(bytes.isdigit, numbers)) else (0, 0)
-        newest = 0 if self._arm is None else self._arm.stop_number
+        newest = 0 if self._arm is None else self._arm.supervision.stop
         blockers = []
         if self._arm is None or self.phase is not Phase.LATCHED:
             blockers.append(f"nothing to reset: the guard is {self.phase.value}")

@@ -5,7 +5,6 @@ Pure. Without a planner no reaction of the scene moves the arm, and nothing that
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -18,8 +17,6 @@ if TYPE_CHECKING:  # a reaction that only stops loads it not
     from .setpoint_stream import MotionStream, ReactionPlanner
 
 __all__ = ["MotionAway"]
-
-_PLACE_TIME = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
 
 
 class _Decision(NamedTuple):
@@ -43,22 +40,14 @@ class MotionAway:
 
     Args:
         planner: of motions away from a touch. None where no reaction moves the arm.
-        internal_control: the driver process moves the arm.
-
-    Attributes:
-        permitted: what stopped the arm lets it move away.
     """
 
-    def __init__(self, planner: ReactionPlanner | None, internal_control: bool) -> None:
-        self.permitted = False
+    def __init__(self, planner: ReactionPlanner | None) -> None:
         self._planner = planner
-        self._mover = "the driver" if internal_control else "a program"
         self._stream: MotionStream | None = None
         self._newest: MotionStream | None = None
         self._resisted: MotionStream | None = None  # that has ended because something was in its way
         self._at_touch: ArmState | None = None
-        self._barred = ""  # why nothing of ours moves the arm any more
-        self._decide_by = -math.inf  # host time until which a standing arm waits for the place of a touch
 
     @property
     def under_way(self) -> bool:
@@ -70,30 +59,14 @@ class MotionAway:
         """True while it gives way to a push: touches are what that follows."""
         return self._stream is not None and self._stream.how == "push"
 
-    @property
-    def undecided(self) -> bool:
-        """True while a standing arm waits for the place of a touch."""
-        return self._decide_by > -math.inf
-
     def feed(self, measured_at: float, state: ControllerState) -> None:
         """Take a measured state, and the host time of its measurement [s]."""
-        if state.stopped_by_safety or not state.powered:
-            self._barred = "the controller has stopped the arm itself"  # nothing of ours moves it then
         if self._planner is not None:
             self._planner.feed(measured_at, state.q)
 
-    def bar(self, why: str) -> None:
-        """Let no motion begin before the next stop."""
-        self._barred = self._barred or why
-
-    def prepare(self, state: ControllerState | None, permitted: bool) -> None:
+    def prepare(self, state: ControllerState | None) -> None:
         """Begin with a new stop, from the state in which its cause was seen."""
-        self.permitted, self._barred = permitted, ""
         self._at_touch = None if state is None else ArmState(state.time, state.q, state.qd)
-
-    def await_place(self, now: float) -> None:
-        """Let the arm, which stands since this host time [s], wait for the place of a touch."""
-        self._decide_by = now + _PLACE_TIME
 
     def abandoned(self, why: str) -> Done:
         """Return the end of the motion under way, before it was made."""
@@ -103,8 +76,10 @@ class MotionAway:
         self,
         state: ControllerState,
         reaction: Reaction,
-        stopping: bool,
-        first_was_enough: bool,
+        permitted: bool,
+        moved_away: bool,
+        bar: str,
+        decide_by: float,
         touches: TouchRecord,
         out: Outputs,
     ) -> _Decision:
@@ -113,22 +88,24 @@ class MotionAway:
         Args:
             state: as measured.
             reaction: the one that is under way.
-            stopping: a touch or a fault has stopped the arm. False where a motion away has ended.
-            first_was_enough: the arm stands by the first stop path alone.
+            permitted: what stopped the arm lets it move away.
+            moved_away: a motion away has followed this stop.
+            bar: why nothing of ours moves the arm. Empty where something may.
+            decide_by: host time until which the place of a touch may become certain [s].
             touches: what it reacts to.
             out: takes commands and events.
         """
         resisted = self._resisted
-        wanted = self.permitted and (resisted.answered if resisted else stopping) and bool(touches.placed)
+        answers = resisted.answered if resisted else not moved_away
+        wanted = permitted and answers and bool(touches.placed)
         if wanted:
             hardest = touches.hardest()  # how firm it was shows by now
             if not resisted or hardest.kind == "stop":
                 reaction = hardest
         wanted = wanted and reaction.kind not in ("stop", "slow")
-        bar = self._barred or ("" if first_was_enough else f"{self._mover} did not stop the arm")
-        if wanted and not bar and not touches.all_placed and state.time < self._decide_by:
+        if wanted and not bar and not touches.all_placed and state.time < decide_by:
             return _Decision(reaction, waits=True)
-        self._resisted, self._decide_by = None, -math.inf
+        self._resisted = None
         if not wanted:
             return _Decision(reaction)
         if bar:
@@ -158,8 +135,8 @@ class MotionAway:
 
     def update(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on from a measured state, or return Done where the motion is over."""
-        if self._stream is None or self._barred:
-            return None  # the core ends a barred motion: it names the fault
+        if self._stream is None:
+            return None
         return self._stream.update(state, contacts, out)
 
     def resisted(self, state: ControllerState, now: float, contacts: Sequence[ContactOnLink]) -> Done | None:

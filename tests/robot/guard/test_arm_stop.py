@@ -62,7 +62,7 @@ def test_a_latched_arm_that_a_program_moves_is_stopped_again(external):
 def test_an_externally_controlled_arm_is_latched_at_the_end_of_a_watch():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0).run(1.2)
     standing = rig.event("standstill").time
-    assert rig.core.phase is Phase.STOPPING  # a program may start again at once
+    assert rig.core.phase is Phase.STANDING  # a program may start again at once
     rig.arm.go([1.0, 0, 0, 0, 0, 0], 4.0)
     rig.run(0.6)
     assert "latched" not in rig.names
@@ -80,7 +80,7 @@ def test_a_program_that_starts_during_the_watch_and_does_not_move_yet_lengthens_
     rig.run(0.3)
     rig.arm.runtime_state = 2
     rig.run(0.6)
-    assert rig.core.phase is Phase.STOPPING
+    assert rig.core.phase is Phase.STANDING
     rig.run(0.2)
     assert rig.core.phase is Phase.LATCHED
 
@@ -107,7 +107,7 @@ def test_a_program_that_starts_a_second_time_gets_a_protective_stop_until_the_co
         rig.arm.go([1.0, 0, 0, 0, 0, 0], 4.0)
         rig.run(0.3)
     assert rig.arm.commands.count(StopPath.PROTECTIVE) > 1  # it stands, but not by that
-    assert rig.core.phase is Phase.STOPPING
+    assert rig.core.phase is Phase.STANDING
     rig.arm.safety_bits = 0b10000000100
     rig.run(0.01)
     assert rig.core.phase is Phase.LATCHED

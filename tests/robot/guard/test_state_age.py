@@ -150,6 +150,7 @@ def test_a_controller_whose_time_stands_still_is_silent():
     assert rig.event("stopping").time < rig.now - 0.1
 
 
+@pytest.mark.promise("P15")
 @pytest.mark.parametrize("step", [-10.0, 3600.0])
 def test_a_clock_that_steps_is_one_stop_with_its_reason_and_a_reset_is_enough(step):
     """Back for good, or ahead for one state. It was 990 stops in 10 s, and no reset."""

@@ -8,18 +8,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 from unittest.mock import patch
 
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import SetSpeedSlider
+from coneskin.robot.guard import arm_supervisor
 from coneskin.robot.guard.activation import Activation, ActivationStep
 from coneskin.robot.guard.arm_stop import ArmStop
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
-from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.phase import Act, Phase
 from coneskin.robot.guard.signals.journal import EventName, emit
 from coneskin.robot.stop.standstill import StandstillWatch
 from coneskin.robot.stop.state_age import StateAge
@@ -47,7 +48,7 @@ class Break:
         settings: of the world.
     """
 
-    owner: type
+    owner: Any
     name: str
     becomes: Callable[[Any], Any]
     words: str
@@ -91,7 +92,7 @@ def _older_clock(was: Any) -> Any:
 
 def _any_stop(was: Any) -> Any:
     def reset(self: Any, block: Any, out: Any) -> None:
-        number = self._arm.stop_number
+        number = self._arm.supervision.stop
         was(self, block._replace(payload=b"%d %s" % (number, block.payload.split()[1])), out)
 
     return reset
@@ -127,8 +128,6 @@ def _inward(was: Any) -> Any:
 
 
 def _turn(step: Any) -> Any:
-    from dataclasses import replace
-
     return replace(step, qd=tuple(-v for v in step.qd)) if hasattr(step, "qd") else step
 
 
@@ -138,11 +137,11 @@ def _move(_: Any, state: Any, out: Any) -> None:
 
 
 def _numbered(was: Any) -> Any:
-    def report(self: Any, now: float, why: str, contact: Any, out: Any) -> None:
-        self.number += 1
-        was(self, now, why, contact, out)
+    def change(state: Any, cue: Any, *args: Any, **more: Any) -> Any:
+        then, act = was(state, cue, *args, **more)
+        return replace(then, stop=then.stop + (act is Act.STOP)), act
 
-    return report
+    return change
 
 
 def _raise(*_: Any) -> None:
@@ -190,7 +189,7 @@ BREAKS: dict[str, Break] = {
         *(StateAge, "feed", _older_clock),
         *("a fresh state is one later than all before", ("clock steps back", "clock steps ahead")),
     ),
-    "counted": Break(ArmStop, "report", _numbered, "a stop has two numbers", _TOUCH),
+    "counted": Break(arm_supervisor, "transition", _numbered, "a stop has two numbers", _TOUCH),
     "fault": Break(
         *(TouchStream, "silence", _instead([]), "a silent skin is untouched", ("skin mute", "mend the skin")),
     ),

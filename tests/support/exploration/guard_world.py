@@ -171,7 +171,7 @@ def _frames(settings: Settings) -> dict[tuple[str, str], Frame]:
     return found
 
 
-_DECIDING = (Phase.STOPPING, Phase.HALTING, Phase.RETREATING, Phase.SLOWED)  # in which more than the phase matters
+_RESTING = (Phase.STARTING, Phase.ACTIVE, Phase.LATCHED)  # in which nothing of a stop or a motion matters
 #: classes of what never changes, although it could
 _SHARED = frozenset({"Workspace", "FrameInversion", "WiringHypothesis", "ArmModel", "_UrDriver", "Sensor"})
 
@@ -272,10 +272,11 @@ class GuardWorld:
         facts += [tuple(core._companions._silent), bool(arm.state_age.trouble(self.now)), arm.backup_ready]
         stop, away, slow = arm._stop, arm._away, arm.speed_reduction
         facts += [slow.now is None, slow._halted_from is None]
-        if core.phase in _DECIDING:
-            facts += [stop.watch.under_way, stop.watch.insists, len(arm._touches.contacts), arm._reaction.kind]
+        if core.phase not in _RESTING:
+            facts += [stop.watch.insists, len(arm._touches.contacts), arm._reaction.kind]
             if moves:
-                facts += [away.permitted, away.undecided, bool(away._barred), away._resisted is None]
+                now = arm.supervision
+                facts += [now.may_move, now.moved_away, bool(now.barred), away._resisted is None]
             if (monitor := stop._monitor) is not None:
                 facts += [monitor.used[-1:] == monitor.used, StopPath.PROTECTIVE in monitor.used]
         return tuple(facts)
@@ -364,7 +365,7 @@ class GuardWorld:
         assert arm is not None
         if self._judge.waiting < math.inf or (arm.state_age.trouble(self.now) and not self.wrong.states):
             return _CLOCK_CYCLES
-        return _VERY_LONG if self.core.phase in _DECIDING else _LONG
+        return _LONG if self.core.phase in _RESTING else _VERY_LONG
 
     def _break(self, name: str, what: str) -> None:
         assert name in INVARIANTS, name
@@ -637,7 +638,7 @@ class GuardWorld:
             and now - judge.fault_since > limit + _MARGIN
         ):
             self._break("fault", f"{fault} for {now - judge.fault_since:.3f} s")
-        stopped = phase not in (Phase.STARTING, Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING, Phase.LATCHED)
+        stopped = phase.stopping
         stands = self.arm.speed < 1e-3 and not self.wrong.states
         judge.standing = min(judge.standing, now) if stopped and stands else math.inf
         if now - judge.standing > _STAND_TIME:
