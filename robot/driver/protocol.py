@@ -109,7 +109,8 @@ class OutputWriter(_Connection, Protocol):
 class StopConnections(_Connection, Protocol):
     """Connections through which an arm can be stopped, whatever moves it.
 
-    Entering it in a ``with`` opens all of them, or raises RobotConnectionError; ``reopen`` opens what it can.
+    Entering it in a ``with`` opens all of them and proves that stops are taken, or raises RobotConnectionError or
+    RobotRefused; ``reopen`` opens what it can.
 
     Attributes:
         host: the controller.
@@ -120,8 +121,11 @@ class StopConnections(_Connection, Protocol):
     def sockets(self) -> dict[str, socket.socket]:
         """Return those that are open, by the name of the stop path that needs them."""
 
-    def drain(self) -> list[tuple[str, socket.socket]]:
-        """Discard what the controller has said; return the connections that are of no use any more, to be closed."""
+    def ask(self) -> None:
+        """Ask the controller whether it still takes stops, without waiting."""
+
+    def drain(self) -> list[tuple[str, socket.socket, str]]:
+        """Take what the controller has said; return the connections that are of no use now, to be closed, and why."""
 
     def use(self, path: StopPath, deceleration: float, /) -> bool:
         """Send one stop without waiting; return whether the system took the bytes."""

@@ -125,6 +125,7 @@ _HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
 #: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
 _PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
+_QUESTION_PERIOD = 0.25  # s between two questions whether the controller takes stops
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
 _REPORT_PERIOD = 0.005  # s between two reports to the session where nothing was decided
 _OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
@@ -169,6 +170,7 @@ class GuardLoop:
         self._quit = False
         self._fed = False  # anything, in this step
         self._beat = -HEARTBEAT_PERIOD
+        self._asked = self._clock()  # when the controller was last asked whether it takes stops
         self._count = 0  # sent last
         self._out: list[bytes] = []
         self._report_at = 0.0  # when the session is told next
@@ -297,7 +299,10 @@ class GuardLoop:
             self._lose(name, f"{what} has ended", channel)
 
     def _send_heartbeat(self) -> None:
-        self._beat = self._clock()
+        self._beat = now = self._clock()
+        if self._ports.stops is not None and now - self._asked >= _QUESTION_PERIOD:
+            self._asked = now
+            self._ports.stops.ask()
         for channel in (self._ports.driver, self._ports.watchdog):
             if channel is not None:
                 channel.send(_HEARTBEAT_BYTES)
@@ -338,10 +343,9 @@ class GuardLoop:
             self._lose(what, str(exc), reader)
 
     def _drain(self, stops: StopConnections) -> None:
-        for name, sock in stops.drain():
+        for name, sock, why in stops.drain():
             self._forget(sock)
             sock.close()
-            why = f"the controller has closed the {name} connection, which a stop may need"
             self._feed(BlockKind.LOST, encode_loss(name, why))
 
     def _feed(self, kind: BlockKind, payload: bytes) -> None:

@@ -80,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         help="where a loaded program with the node External Control asks for its script (%(default)s)",
     )
-    add("--local-control", action="store_true", help="say that the robot is not under remote control")
+    add("--local-control", action="store_true", help="start in local control: no program and no command is taken")
     add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
     add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add(

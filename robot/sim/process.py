@@ -70,7 +70,7 @@ class SimulatedController(OwnedProcess):
         program: URScript file that the dashboard command ``play`` starts.
         programs: folder of the programs and installations that the dashboard can load.
         external_control: HOST:PORT at which such a program asks for the script of its External Control node.
-        remote_control: whether the robot says that it is under remote control.
+        remote_control: whether the robot starts under remote control.
         plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
             follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].

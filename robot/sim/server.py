@@ -73,6 +73,8 @@ class _FaultInjector:
             "safeguard closed": lambda: controller.safeguard(False),
             "reduced mode on": lambda: controller.reduce(True),
             "reduced mode off": lambda: controller.reduce(False),
+            "local control": lambda: controller.switch_control(False),
+            "remote control": lambda: controller.switch_control(True),
         }
         for word, names in _SERVICE_PORTS.items():
             for verb, action in network.items():

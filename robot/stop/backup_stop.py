@@ -150,7 +150,7 @@ class BackupStop:
                 self._state = state
         except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
             self._close_reader()
-        for _, sock in self._connections.drain():
+        for _, sock, _ in self._connections.drain():
             sock.close()
         return states
 

@@ -11,6 +11,10 @@ A secondary program runs beside the main one and no upload replaces it, so that 
 at once cannot keep the protective stop away. Whether a controller takes the call there is measured by
 scripts/measure_controller.py; where it does not, the program before it does the same as long as nobody replaces it.
 
+A controller in local control refuses the programs and the dashboard's stop, and closes nothing. So the dashboard is
+asked at the start, and again and again: "is in remote control". Software that does not know the question has no local
+control.
+
 Source: UR script manual, dashboard server manual; which of these stops which motion was measured in a simulation
 (docs/safety.md, "Stop paths").
 """
@@ -20,13 +24,14 @@ from __future__ import annotations
 import socket
 from contextlib import suppress
 
-from coneskin.core.errors import RobotConnectionError
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import SetpointProgram, StopPath
 
 __all__ = ["StopSockets"]
 
 _REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
+_MAX_ANSWER = 1024  # bytes of a line of the dashboard
 _PROTECTIVE_PROGRAM = """def coneskin_stop():
   protective_stop()
 end
@@ -34,6 +39,11 @@ sec coneskin_protective():
   protective_stop()
 end
 """
+_QUESTION = b"is in remote control\n"
+_LOCAL_CONTROL = (
+    "is in local control: it refuses every stop by program or command. Choose Remote Control at the top right of the "
+    "pendant, then start again"
+)
 _STOP_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
 
 
@@ -46,17 +56,20 @@ class StopSockets:
 
     Raises:
         RobotConnectionError: on entering, where a port does not answer.
+        RobotRefused: on entering, where the controller is in local control.
     """
 
     def __init__(self, host: str, timeout: float = 2.0) -> None:
         self.host = host
         self._timeout = timeout
         self._open_ones: dict[str, socket.socket] = {}
+        self._said = b""  # by the dashboard, since its last whole line
 
     def __enter__(self) -> StopSockets:
         try:
             for name, port in _STOP_PORTS.items():
                 self._open_ones[name] = self._open(port)
+            self._prove_remote(self._open_ones["command"])
         except BaseException:
             self.close()
             raise
@@ -75,26 +88,58 @@ class StopSockets:
         """Return the open sockets, by stop path. The controller sends on both: ``drain`` them."""
         return dict(self._open_ones)
 
-    def drain(self) -> list[tuple[str, socket.socket]]:
-        """Discard what the controller has sent, at most 64 kB a call and socket, without waiting.
+    def ask(self) -> None:
+        """Ask the dashboard whether the controller still takes stops, without waiting; ``drain`` takes its answer."""
+        self._send("command", _QUESTION)
+
+    def drain(self) -> list[tuple[str, socket.socket, str]]:
+        """Take what the controller has sent, at most 64 kB a call and socket, without waiting.
 
         Returns:
-            the sockets that are no longer of use, for the caller to close: the controller has closed them, or the
-            system could not take a whole program, so that the next one would not be understood.
+            the sockets that are no longer of use, for the caller to close, and why: the controller has closed them, or
+            is in local control, or the system could not take a whole program, so that the next one would not be
+            understood.
         """
-        gone = []
+        gone: dict[str, str] = {}
         for name, sock in self._open_ones.items():
             try:
-                if sock.recv(1 << 16):
-                    continue
+                data = sock.recv(1 << 16)
             except BlockingIOError:
                 continue
             except OSError:
-                pass
-            gone.append((name, sock))
-        for name, _ in gone:
-            del self._open_ones[name]
-        return gone
+                data = b""
+            if not data:
+                gone[name] = f"the controller has closed the {name} connection, which a stop may need"
+            elif name == "command" and self._is_local(data):
+                gone = dict.fromkeys(self._open_ones, f"the controller {self.host} {_LOCAL_CONTROL}")
+                break
+        return [(name, self._open_ones.pop(name), why) for name, why in gone.items()]
+
+    def _is_local(self, data: bytes) -> bool:
+        """Take what the dashboard has said; tell whether that is the answer of local control."""
+        *lines, self._said = (self._said + data).split(b"\n")
+        self._said = self._said[-_MAX_ANSWER:]
+        return any(line.strip().lower() == b"false" for line in lines)
+
+    def _prove_remote(self, sock: socket.socket) -> None:
+        """Wait for the dashboard's answer: a connection alone proves no stop."""
+        sock.settimeout(self._timeout)
+        answers: list[bytes] = []
+        try:
+            sock.sendall(_QUESTION)
+            with sock.makefile("rb") as lines:
+                while len(answers) < 2 and (line := lines.readline(_MAX_ANSWER)):  # its welcome is the first
+                    answers.append(line.strip())
+        except OSError:
+            pass
+        sock.setblocking(False)
+        if len(answers) < 2:
+            raise RobotConnectionError(
+                f"the dashboard of the controller {self.host} (port 29999), which a stop may need, does not answer "
+                f"within {self._timeout:g} s"
+            )
+        if answers[1].lower() == b"false":
+            raise RobotRefused(f"the controller {self.host} {_LOCAL_CONTROL}")
 
     def use(self, path: StopPath, deceleration: float) -> bool:
         """Send one stop without waiting.

@@ -151,6 +151,7 @@ class Controller:
 
     Attributes:
         cycle: number of control cycles since power-on.
+        remote_control: False in local control, in which no program and no command is taken.
         outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
         inputs: what clients write.
         program: main program; None while none is loaded.
@@ -186,6 +187,7 @@ class Controller:
         self.secondary: list[Program] = []
         self.runtime = Runtime.STOPPED
         self.robot_mode = RobotMode.RUNNING
+        self.remote_control = options.remote_control
         self.safety_system = _SafetySystem(options.unlock_after, self.log, self.tell)
         self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=_HISTORY_LENGTH)
         self.notices: deque[Notice] = deque(maxlen=_MAX_NOTICES)
@@ -375,6 +377,12 @@ class Controller:
         """Begin or end reduced mode, in which paths and speeds are at most `_REDUCED_SHARE` of what is commanded."""
         self.safety_system.reduce(on)
         return self.safety.name
+
+    def switch_control(self, remote: bool) -> bool:
+        """Switch to remote or to local control, as a person does on the pendant; a running program goes on."""
+        self.remote_control = remote
+        self.log("control", remote=remote)
+        return remote
 
     def emergency_stop(self) -> None:
         """Act on the emergency stop button: the arm brakes and loses power, the program ends."""

@@ -128,7 +128,8 @@ class Options:
         program: URScript that the dashboard's ``play`` starts.
         programs: folder of the programs and installations that the dashboard can load.
         external_control: host and port from which a program takes the script of its External Control node.
-        remote_control: whether the robot says that it is under remote control; it takes commands in any case.
+        remote_control: whether the robot starts under remote control. In local control it takes no program, and no
+            command that changes anything.
     """
 
     model: str = DEFAULT_MODEL

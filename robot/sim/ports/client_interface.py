@@ -306,10 +306,17 @@ class ScriptPort:
     def __init__(self, controller: Controller, run: Callable[[str], None], *, messages: bool = False) -> None:
         self._controller, self._run, self._messages = controller, run, messages
         self._rest = ""
+        self._opened_local = not controller.remote_control
         self.left = False
 
     def __call__(self, data: bytes) -> bytes:
-        """Take bytes; nothing is answered, but to a program that is too long."""
+        """Take bytes; nothing is answered, but to a program that is too long. In local control nothing is taken.
+
+        Nor is it after a switch to remote control, over a connection that was opened before.
+        """
+        if self._opened_local or not self._controller.remote_control:
+            self._controller.log("dropped", reason="local control")
+            return b""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))
         if len(self._rest) > MAX_LENGTH:
             self._rest, self.left = "", True

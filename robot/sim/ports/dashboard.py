@@ -1,8 +1,8 @@
 """Dashboard server of the simulated controller: a line in, a line out. No sockets.
 
-The clients compare replies word for word; they end with a newline alone. A command that a version of the software does
-not have is not understood. Source: Universal Robots, "Dashboard Server, port 29999" (CB3) and "Dashboard Server
-e-Series".
+The clients compare replies word for word; they end with a newline alone. In local control what acts is refused. A
+command that a version of the software does not have is not understood. Source: Universal Robots, "Dashboard Server,
+port 29999" (CB3) and "Dashboard Server e-Series".
 """
 
 from __future__ import annotations
@@ -24,6 +24,16 @@ WELCOME = "Connected: Universal Robots Dashboard Server"
 _UNLOCK_REFUSED = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
+#: reply to a command that acts, in local control; and on a connection that was opened in it
+_LOCAL_REFUSAL = (
+    "Command is not allowed due to safety reasons, "
+    "please switch robot to Remote Control mode and reconnect to port 29999"
+)
+_REMOTE_COMMANDS = {
+    *POWER_COMMANDS,
+    *("load", "load installation", "play", "pause", "stop", "shutdown"),
+    *("close safety popup", "unlock protective stop"),
+}
 _USER_ROLES = ("PROGRAMMER", "OPERATOR", "NONE", "LOCKED", "RESTRICTED")
 _OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 _NO_VERSION = None
@@ -59,6 +69,7 @@ class Dashboard:
         self._i = interface
         self._c = interface.controller
         self.left = False
+        self._opened_local = not interface.controller.remote_control
         self._commands: dict[str, Callable[[str], str]] = {
             "PolyscopeVersion": lambda _: f"URSoftware {self._version} (Jan 01 2026)",
             "addToLog": self._add_to_log,
@@ -72,7 +83,7 @@ class Dashboard:
             "get robot model": lambda _: self._c.arm.model.name.removesuffix("e"),
             "get serial number": lambda _: SERIAL_NUMBER,
             "getUserRole": lambda _: self._i.user_role,
-            "is in remote control": lambda _: str(self._c.options.remote_control).lower(),
+            "is in remote control": lambda _: str(self._c.remote_control).lower(),
             "isProgramSaved": lambda _: f"true {self._i.program_name}",
             "load": self._load,
             "load installation": self._load_installation,
@@ -109,6 +120,9 @@ class Dashboard:
         for count in range(min(4, len(words)), 0, -1):  # the longest command that the line begins with
             name = " ".join(words[:count])
             if name in self._commands and available(name, self._c.options.version):
+                if name in _REMOTE_COMMANDS and (self._opened_local or not self._c.remote_control):
+                    self._c.log("refused", line=command, reason="local control")
+                    return _LOCAL_REFUSAL
                 return self._commands[name](" ".join(words[count:]).strip())
         return f"could not understand: '{command}'"
 

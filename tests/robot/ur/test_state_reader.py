@@ -1,6 +1,7 @@
 """State reader and stop sockets against the simulated controller, and against peers that misbehave."""
 
 import math
+import select
 import socket
 import threading
 
@@ -96,6 +97,52 @@ def test_external_stops_reach_the_arm(controller):
             pytest.fail("the protective stop did not reach the controller")
     assert stops.use(StopPath.PROGRAM, 5.0) is False
     stops.close()
+
+
+def test_a_controller_in_local_control_is_refused_and_one_that_is_switched_is_told(controller):
+    """Its script port and its dashboard take connections, and no stop: found at the start, and while it is watched."""
+    with StopSockets(controller.host, PATIENCE) as stops:
+        stops.ask()
+        assert select.select(list(stops.sockets().values()), (), (), PATIENCE)[0]
+        assert stops.drain() == []
+        controller.call("local control")
+        try:
+            gone = []
+            while not gone:
+                stops.ask()
+                select.select([stops.sockets()["command"]], (), (), PATIENCE)
+                gone = stops.drain()
+            assert {name for name, _, _ in gone} == {"program", "command"}
+            assert all("Choose Remote Control" in why for _, _, why in gone)
+            assert stops.sockets() == {}
+            with (
+                pytest.raises(RobotRefused, match="local control: it refuses every stop"),
+                StopSockets(controller.host),
+            ):
+                pass
+        finally:
+            controller.call("remote control")
+            for _, sock, _ in gone:
+                sock.close()
+
+
+@pytest.mark.parametrize("answer", [b"", b"Connected: Universal Robots Dashboard Server\n"])
+def test_a_dashboard_that_answers_nothing_proves_no_stop(monkeypatch, answer):
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.sendall(answer)
+        monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
+        with pytest.raises(RobotConnectionError, match="does not answer within"), StopSockets("127.0.0.1", 0.05):
+            pass
+
+
+def test_software_that_knows_no_local_control_is_taken(monkeypatch):
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.sendall(b"Connected: Universal Robots Dashboard Server\ncould not understand: 'is in remote control'\n")
+        monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
+        with StopSockets("127.0.0.1", PATIENCE) as stops:
+            assert list(stops.sockets()) == ["program", "command"]
 
 
 class Peer:

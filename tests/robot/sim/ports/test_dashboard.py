@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.robot.sim.ports.dashboard import available
+from coneskin.robot.sim.ports.dashboard import Dashboard, available
 from tests.robot.sim.ports.console import WAIT, Console, packed
 from tests.support.paths import ROOT
 
@@ -143,9 +143,18 @@ def test_log_messages_and_reports_are_packed_into_a_support_file(console: Consol
         assert console.say(f"generate support file {folder}").startswith(f"Error: {folder} is not a folder")
 
 
-def test_remote_control_is_what_the_options_say() -> None:
+def test_local_control_refuses_what_acts_and_answers_questions() -> None:
+    """The refusal's words, and that a connection of local control stays dead, are those of UR's ROS driver's issues."""
     assert Console().say("is in remote control") == "true"
-    assert Console(remote_control=False).say("is in remote control") == "false"
+    local = Console(remote_control=False)
+    assert local.say("is in remote control") == "false"
+    assert local.say("programState").startswith("STOPPED")
+    for command in ("stop", "play", "load wait.urp", "power off", "brake release", "unlock protective stop"):
+        assert local.say(command).startswith("Command is not allowed due to safety reasons")
+    local.controller.switch_control(True)
+    assert local.say("is in remote control") == "true"
+    assert local.say("stop").startswith("Command is not allowed")
+    assert Dashboard(local.interface).answer("stop") == "Stopped"
 
 
 def test_a_client_takes_its_leave(console: Console) -> None:
