@@ -320,7 +320,11 @@ def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
         high = math.radians(38.0)
         view = _View(body, (math.cos(high) * math.cos(turn), math.cos(high) * math.sin(turn), math.sin(high)))
         numbers = np.array([part.number - 1 for part in collar.parts])[owner] % len(paints)
-        view.draw(axes, lambda hit, _, own=numbers: paints[own[hit]], _LIGHT_DIRECTION)
+
+        def painted(hit: Any, _: Any, own: Any = paints[numbers]) -> Any:
+            return own[hit]
+
+        view.draw(axes, painted, _LIGHT_DIRECTION)
         for part, way in zip(collar.parts, ways, strict=True):
             out = view.flat(way) / np.linalg.norm(view.flat(way))
             own = view.flat(body.vertices)
