@@ -103,7 +103,7 @@ def digests(paths: list[str], disturbed: int) -> dict[str, object]:
         found[path] = digest(new_core(), inputs)
     new_core, inputs = inputs_of(COLLISION)
     for seed in range(disturbed):
-        found[f"disturbed, seed {seed}"] = digest(new_core(), disturb(inputs, random.Random(seed)))
+        found[f"disturbed-{seed}"] = digest(new_core(), disturb(inputs, random.Random(seed)))
     return {"build": code_build(), "outputs": found}
 
 
@@ -230,7 +230,7 @@ def main() -> int:
     print(f"\nreplay, reading included: {rates} times real time")
     one, other = outputs.values()
     rows = [[Path(name).name, *map(str, one[name]), "yes" if one[name] == other[name] else "NO"] for name in one]
-    show("outputs of both builds", ["run", "inputs", "outputs", "sha256", "the same"], rows)
+    show("outputs of both builds", ["run", "inputs", "outputs", "sha256", "same"], rows)
     return int(one != other)
 
 
