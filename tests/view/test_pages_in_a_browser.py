@@ -151,7 +151,8 @@ def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_pat
         shown = LivePage(server, live.course.stage, lambda before: live if before is None else None)
         over, alive = threading.Event(), threading.Event()
         alive.set()
-        threading.Thread(target=serve, daemon=True).start()
+        server_thread = threading.Thread(target=serve, daemon=True)
+        server_thread.start()
         write_until(located - 0.1)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-notice", NOTICE)
@@ -168,6 +169,7 @@ def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_pat
         write_until(3.842, located + 1e-6)
         for said in ("latched: stands until a manual reset", "driver, stands after 107 ms", "retreated 19.5 mm"):
             wait_for_text(page, "body", said)
+        page.wait_for_function("document.querySelector('.coneskin-plot').dataset.until > 3.8")  # drawn twice a second
         page.evaluate("document.querySelector('.coneskin-plot').scrollIntoView()")
         since, until = (float(page.get_attribute(".coneskin-plot", f"data-{end}")) for end in ("since", "until"))
         seen = np.flatnonzero(shown_trace(page) < 0.5)
@@ -185,14 +187,17 @@ def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_pat
         page.set_viewport_size(SIZE)
         over.set()
         wait_for_text(page, "#coneskin-stale", "NOTHING NEW from the page's server")
+        server_thread.join()
         over.clear()
         alive.clear()
-        threading.Thread(target=serve, daemon=True).start()
+        server_thread = threading.Thread(target=serve, daemon=True)
+        server_thread.start()
         wait_for_text(page, "#coneskin-stale", "NOTHING NEW from the guard")
         assert page.inner_text("#root .coneskin-phase").startswith("was latched: stands until a manual reset, ")
         assert magenta(pixels(page, look_closely(server, page, point, normal))) == 0, "the scene has faded"
         recorder.close()
         wait_for_text(page, "#coneskin-stale", "the run is over")
         over.set()
+        server_thread.join()
         shown.close()
         assert page.wrong == []
