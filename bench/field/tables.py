@@ -44,6 +44,8 @@ def print_work(runs: list[Run]) -> None:
     for problem in dict.fromkeys(r.problem for r in runs):
         mine = [r for r in runs if r.problem == problem]
         ours = list(dict.fromkeys(r.solver for r in mine if r.ours))
+        if ours == ["coneskin single"]:
+            continue  # a table of its own
         peers = list(dict.fromkeys(r.solver for r in mine if not r.ours))
         short = [name.removeprefix("coneskin ") for name in ours]
         head = ["error", *short, *peers, *(f"ratio {name}" for name in short)]
@@ -56,7 +58,7 @@ def print_work(runs: list[Run]) -> None:
                 [f"{target:.0e}", *map(show_time, own), *(f"{show_time(a)} / {show_time(b)}" for a, b in theirs)]
                 + [f"{_ratio(best[0], t)} / {_ratio(best[1], t)}" for t in own]
             )
-        title = f"'{problem}': time for one scene and both phases to reach an error (mesh included / given)"
+        title = f"'{problem}': time to an error, mesh included / given"
         show(title, head, rows)
 
 
