@@ -39,7 +39,8 @@ display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
 .coneskin-plot>span{position:absolute;left:3px;background:#f9fafbcc;color:#111827}.coneskin-read{min-height:1.4em}
 .coneskin-ends{display:flex;justify-content:space-between}#coneskin-top{display:none}@media(max-width:700px){
 #coneskin-top{display:block;position:fixed;z-index:20;left:0;right:0;top:0;background:#fff;padding:2px 0 4px;
-max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}[class*=Notifications-root]{display:none!important}}
+max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}#root .coneskin-phase,
+#root .coneskin-card,[class*=Notifications-root]{display:none!important}}
 """
 
 _PANEL_SCRIPT = """
@@ -52,8 +53,7 @@ _PANEL_SCRIPT = """
     if (told < sent) offset = Infinity;  // another server
     if (told !== sent) {
       offset = Math.min(now - told, offset + 2e-4 * (now - looked));
-      looked = now;
-      sent = told;
+      [looked, sent] = [now, told];
     }
     return [now - offset - (clock.dataset.news || told), now - offset - told];
   }
@@ -71,8 +71,7 @@ _PANEL_SCRIPT = """
       all('#coneskin-stale').forEach((line) => put(line, 'textContent', words));
       let top = document.getElementById('coneskin-top');
       if (top === null) {
-        top = document.body.appendChild(document.createElement('div'));
-        top.id = 'coneskin-top';
+        top = Object.assign(document.body.appendChild(document.createElement('div')), { id: 'coneskin-top' });
       }
       const parts = all('#root .coneskin-phase, #root .coneskin-card').map((part) => part.outerHTML).join('');
       if (top.coneskin !== parts) { top.innerHTML = parts; top.coneskin = parts; }
