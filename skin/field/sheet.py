@@ -108,7 +108,8 @@ class SectorSheet:
     @property
     def length(self) -> float:
         """Side L of the rectangle between the arcs A and B [m]."""
-        return math.log1p(self.curvature * self.width) / self.curvature if self.curvature else self.width
+        # numpy's log1p, as in `along`: the two libraries differ by one rounding, and a far edge lay off the sheet.
+        return float(np.log1p(self.curvature * self.width)) / self.curvature if self.curvature else self.width
 
     @property
     def breadth(self) -> float:

@@ -41,7 +41,7 @@ def test_the_driven_sheets_have_the_potentials_of_the_sensors_law(sensor: Sensor
     cone = sensor.frustum
     places = [(0.1 * cone.slant, 0.2), (0.5 * cone.slant, 3.0), (0.9 * cone.slant, cone.wrap - 0.1)]
     field = field_at(sensor, *places)
-    law = np.array([sensor.potentials(*place) for place in places])
+    law = np.array([sensor.fractions(*place) for place in places]) * sensor.electronics.supply_volts
     for column, what in enumerate(("radial phase, upper sheet", "angular phase, lower sheet")):
         assert field.potentials(what, None) == pytest.approx(law[:, column], abs=3e-3 * field.supply)
 
