@@ -44,7 +44,7 @@ _MAX_KA_WEIGHT = 6.0  # a bond has an infinite ka, and is no less usual than thi
 _LAST_NODE = 6
 _NODE_NUMBERS = range(_LAST_NODE + 1)
 _MIN_C = 0.003  # ka of 300: a bond
-_MIN_DISC_C = 0.25  # of the largest disc that is one contact; less is a ring of firm contacts, or a larger one
+_MIN_DISC_C = 0.25  # of the largest disc that is one contact; less has a ring of firm contacts, or a larger one
 _NODE_WIDTH = 0.35  # of the distance between a node's neighbours
 _MODEL_VARIANCE = 0.05**2  # of A^2; no real contact is a uniform disc
 _MODEL_RADIUS = 0.1  # of ln a; half the distance of two nodes, and the same
@@ -316,10 +316,9 @@ class PlaceEstimator:
         """Return the dipole of one disc of a radius [m] that has the measured conductance, on the sheet [S m^2].
 
         No disc of that conductance within the radius has more: what is narrower must be firmer, and adds less.
-        0 where not even a bond within three quarters of the radius has the conductance.
         """
-        c = math.log(radius) + spread
-        return 2.0 * math.pi / self._sum * radius * radius * _disc_share(c) if c > _MIN_DISC_C else 0.0
+        share = _disc_share(max(_MIN_DISC_C, math.log(radius) + spread))
+        return 2.0 * math.pi / self._sum * radius * radius * share
 
     def place(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float]:
         """Return u [m] and phi [rad] of an electrical centre and the move from there to the place [m]."""
