@@ -179,7 +179,9 @@ class PlaceEstimate(NamedTuple):
     move_x: float  #: from the electrical centre to the place, in the rectangle [m]
     move_y: float
     dipole: _DipoleStrength
-    spread: float  #: c of a disc of 1 m that has the conductance: 2 pi/Rs (1/G - Robin function) less ln of the stretch
+    edge: (
+        float  #: what place and edges add to c of a disc: less 2 pi/Rs times the Robin function, less ln of the stretch
+    )
 
 
 class PlaceEstimator:
@@ -262,8 +264,8 @@ class PlaceEstimator:
         noise_unequal = 0.25 * (noise_xx + noise_yy - 2.0 * noise_both)
         per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
         tolerated = (xx + yy) / (per_dipole + 1e-12 * rs * rs)
-        beyond = 1.0 / matrix.conductance - robin
-        dipole = _weigh_dipole(measured, noise, rs, beyond, stretch, tolerated)
+        dipole = _weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
+        edge_c = -2.0 * math.pi / rs * robin - math.log(stretch)
         prior = (_ROUND_INEQUALITY * dipole.strength) ** 2
         gain1, gain2 = _gain(unequal, noise_unequal, prior), _gain(a_xy, noise_xy, prior)
         half, cross = gain1 * unequal, gain2 * a_xy
@@ -309,16 +311,15 @@ class PlaceEstimator:
         stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
-        spread = 2.0 * math.pi / rs * beyond - math.log(stretch)
-        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole, spread)
+        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole, edge_c)
 
-    def disc_dipole(self, radius: float, spread: float) -> float:
-        """Return the dipole of one disc of a radius [m] that has the measured conductance, on the sheet [S m^2].
+    def disc_dipole(self, radius: float, conductance: float, edge: float) -> float:
+        """Return the dipole of one disc of a radius [m] that has a conductance [S], on the sheet [S m^2].
 
         No disc of that conductance within the radius has more: what is narrower must be firmer, and adds less.
         """
-        share = _disc_share(max(_MIN_DISC_C, math.log(radius) + spread))
-        return 2.0 * math.pi / self._sum * radius * radius * share
+        k = 2.0 * math.pi / self._sum
+        return k * radius * radius * _disc_share(max(_MIN_DISC_C, math.log(radius) + k / conductance + edge))
 
     def place(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float]:
         """Return u [m] and phi [rad] of an electrical centre and the move from there to the place [m]."""

@@ -348,7 +348,9 @@ class TouchPlace:
             single.begin()
             self._begun, self._first_x, self._first_y = True, x, y
         self._newest = x, y
-        disc = self._estimator.disc_dipole(single.largest_disc(u), estimate.spread) if estimate is not None else None
+        disc = None
+        if estimate is not None:
+            disc = self._estimator.disc_dipole(single.largest_disc(u), matrix.conductance, estimate.edge)
         doubt = single.feed(matrix, level, u, disc)
         if before is None:
             return doubt or MOVES

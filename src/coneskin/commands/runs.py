@@ -272,7 +272,7 @@ def _cut(args: argparse.Namespace) -> int:
         print(json.dumps(facts))
         return 0
     print(f"{done.path}: {done.size / 1e3:.0f} kB, from {done.since:.3f} s to {done.until:.3f} s")
-    print(f"{done.contacts} contact{'s'[: done.contacts != 1]}, as in the whole run (within 0.5 mm and 10 ms)")
+    print(f"{done.contacts} contact{'s'[: done.contacts != 1]}, as in the whole run (within 0.5 mm and 5 ms)")
     if not done.active:
         print("the guard is not active yet at the contact: this shows the contact, and not the reaction")
     if done.other_reaction:
@@ -295,7 +295,7 @@ def _diff(args: argparse.Namespace) -> int:
 
         tolerances = CUT_TOLERANCES
         if not args.json:
-            print("one of them is a cut: what a start in the middle changes does not count (0.5 mm, 1.1 deg, 10 ms)")
+            print("one of them is a cut: what a start in the middle changes does not count (0.5 mm, 1.1 deg, 5 ms)")
     comparison = compare_decisions(one, other, tolerances)
     if args.json:
         print(json.dumps(comparison_facts(comparison)))

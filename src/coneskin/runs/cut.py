@@ -37,8 +37,8 @@ __all__ = ["CUT_TOLERANCES", "cut_run", "first_touch"]
 _SKIN_SETTLE = 0.5
 #: s of a cut whose duration nobody names
 _KEPT_TIME = 1.0
-#: what a start in the middle may change: zero and noise of the skin, by which a place is certain, are learned anew
-CUT_TOLERANCES = Tolerances(place=5e-4, angle=0.02, level=0.02, speed=0.01, time=0.01, relative=0.01)
+#: what a start in the middle may change: the zero of the skin is learned from other frames
+CUT_TOLERANCES = Tolerances(place=5e-4, angle=0.02, level=0.02, speed=0.01, time=5e-3, relative=0.01)
 _SURFACES, _TRUTH, _ABSENT = (frozenset({kind}) for kind in (BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.ABSENT))
 _REACTION_EVENTS = frozenset(
     {
@@ -59,7 +59,7 @@ class _CutRun:
         since: its first input [s since the start of the whole run].
         until: its last.
         contacts: in it.
-        comparison: of its contacts with those of the whole run, within 0.5 mm, 1 deg and 10 ms.
+        comparison: of its contacts with those of the whole run, within 0.5 mm, 1 deg and 5 ms.
         active: True where the guard is active at the first contact, so that the cut shows the reaction as well.
         other_reaction: how the arm reacts otherwise than in the whole run, in words; empty where it does not. A guard
             that starts in the middle knows the controller's clock less well: where states came late, or the frames
