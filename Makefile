@@ -48,7 +48,7 @@ build/compiled/done: setup.py $(shell find -L src/coneskin -name '*.py') | $(VEN
 	$(BIN)/python -m build -q --sdist --no-isolation --outdir build/compiled
 	CONESKIN_COMPILE=1 $(BIN)/python -m pip wheel -q --no-deps --no-build-isolation -w build/compiled build/compiled/*.tar.gz
 	$(BIN)/python -m zipfile -e build/compiled/*.whl build/compiled
-	touch build/compiled/*.so build/compiled/coneskin/*/*.so && touch $@
+	find build/compiled -name '*.so' -exec touch {} + && touch $@  # later than their sources
 
 check-compiled: $(VENV)/dev.stamp build/compiled/done
 	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH="$(CURDIR)/build/compiled" scripts/tests "not long"

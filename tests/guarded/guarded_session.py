@@ -29,8 +29,8 @@ PATIENT = (
 )
 #: what a guard says where this computer has held it up in a motion away
 _HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for")
-#: ... and where it touched the arm, or let it move away, so late that its way or its time was used up
-_HELD_UP += ("as far as arm_distance_mm lets it", "the time of 2.0 s is over")
+#: ... and where it touched the arm so late that no way was left, or let it move away so late that its time was used up
+_HELD_UP += ("no retreat: a point of the arm has moved", "the time of 2.0 s is over")
 _TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
 
 
