@@ -94,7 +94,8 @@ CONTROLLER_KINDS = (
     FaultKind("script ports closed", says("close scripts")),
     FaultKind("protective stop", says("protective stop")),
     FaultKind("emergency stop", says("emergency stop")),
-    FaultKind("another program started, then a touch", then(a_program, touch), touched=True),
+    # with internal control the program's end is a fault by itself, before the touch
+    FaultKind("another program started, then a touch", then(a_program, touch), touched=True, controls=EXTERNAL),
 )
 
 
