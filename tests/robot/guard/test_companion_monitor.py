@@ -256,6 +256,7 @@ def test_a_restart_that_is_announced_again_and_again_has_no_more_than_5_s():
     assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
 
 
+@pytest.mark.pure  # compiled, the time is a constant
 def test_a_restart_that_was_refused_leaves_the_next_one_its_time(monkeypatch):
     monkeypatch.setattr(companion_monitor, "_RESTART_TIMEOUT", 1.0)
     rig = GuardRig(speed=0.0).run(0.5)
