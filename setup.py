@@ -16,9 +16,10 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 ROOT = Path(__file__).parent
-#: modules of the live path and of replays, by the library that they become; each library is one run of the C compiler
+#: modules of the live path, of replays, and of the field's single scenes, by the library that they become; each library
+#: is one run of the C compiler
 COMPILED = {
-    "skin": ("core/version", "skin/*", "skin/detection/*", "skin/detection/*/*"),
+    "skin": ("core/version", "skin/*", "skin/detection/*", "skin/detection/*/*", "skin/field/one_scene"),
     "robot": ("robot/driver/*", "robot/stop/*", "robot/guard/*", "robot/guard/*/*", "robot/ur/*"),
     "motion": ("robot/arm/*", "robot/reaction/*"),
 }

@@ -8,7 +8,7 @@ from bench.report import show
 
 from .cells import Cell
 from .disturbances import Errors
-from .several import Power, Several
+from .several import PRESS_FRAMES, Power, Several
 
 ELLIPSE_BAND = (0.93, 0.97)  # of the truths that an ellipse of 95 % may hold
 MAX_FRAME_TIME = 25.0  # us, bytes to event
@@ -28,7 +28,7 @@ def show_several(electric: str, kinds: list[Several]) -> list[str]:
     for k in [*kinds, total]:
         worst = " ".join(map(str, k.worst[:5]))
         rows.append([k.kind, *map(str, (k.cases, k.touched, k.valid, k.any_off, k.all_off)), worst])
-    title = f"several contacts, {electric}: cases with a valid frame within 20 whose normal is more than 20 deg off"
+    title = f"several contacts, {electric}: with a valid frame of {PRESS_FRAMES} whose normal is more than 20 deg off"
     show(title, ["press", "cases", "touches", "ever valid", "off any", "off all", "cases"], rows)
     goal = f"no certain place off a contact, {electric}"
     return _goal(goal, f"{total.any_off} of {total.cases}", total.any_off == 0)

@@ -22,9 +22,10 @@ class Stamp:
     """One read of the port.
 
     Attributes:
-        sequences: of the frames that were read whole; usually one, and none where a frame was cut.
         read: when [s].
+        data: what was read.
         phase: of the guard then.
+        sequences: of the frames that were read whole; usually one, and none where a frame was cut.
         reason: why the guard was last stopped or kept from becoming active, where it is not active.
         decided: when a stop was decided [s]; 0 without one.
         sent: when it was sent [s].
@@ -32,9 +33,10 @@ class Stamp:
         done: when the loop's round was over [s].
     """
 
-    sequences: tuple[int, ...]
     read: float
+    data: bytes
     phase: Phase
+    sequences: tuple[int, ...] = ()
     reason: str = ""
     decided: float = 0.0
     sent: float = 0.0
@@ -53,14 +55,12 @@ class Stamps:
 
     all: list[Stamp] = field(default_factory=list)
     core: GuardCore | None = None
-    _decoder: FrameDecoder = field(default_factory=FrameDecoder)
 
     def read(self, data: bytes) -> None:
-        """Stamp what has just been read."""
+        """Stamp what has just been read. It is looked at later: the guard waits."""
         now = CLOCK()
         assert self.core is not None
-        frames = self._decoder.feed(data)
-        self.all.append(Stamp(tuple(frame.sequence for frame in frames), now, self.core.phase))
+        self.all.append(Stamp(now, data, self.core.phase))
 
     def done(self) -> None:
         """Stamp that a round of the loop is over."""
@@ -68,11 +68,13 @@ class Stamps:
             self.all[-1].done = CLOCK()
 
     def explain(self, recorded: bytes) -> None:
-        """Say why the guard was not active, and why it stopped, from what it has recorded."""
+        """Say which frames each read has, why the guard was not active, and why it stopped, from its recording."""
+        decoder = FrameDecoder()
         events = [decode_event(block) for _, block in decode_blocks(recorded) if block.kind == BlockKind.EVENT]
         reason, at = "it has not been active yet", 0
         ends = [stamp.read for stamp in self.all[1:]] + [math.inf]
         for stamp, end in zip(self.all, ends, strict=True):
+            stamp.sequences = tuple(frame.sequence for frame in decoder.feed(stamp.data))
             stamp.reason = reason
             while at < len(events) and events[at].time < end:
                 event, at = events[at], at + 1

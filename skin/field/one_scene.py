@@ -86,7 +86,7 @@ class _Tables(NamedTuple):
         slopes: of offset, (-1)^(m-1) / m.
     """
 
-    turns: dict[complex, tuple[Complex, Complex]]
+    turns: dict[Any, tuple[Complex, Complex]]  # complex, which mypyc does not find here
     bends: Floats
     powers: Floats
     index: Any
@@ -116,7 +116,7 @@ class _Pair(NamedTuple):
 
     first: int
     second: int
-    turn: complex
+    turn: Any
     high_far: float
     low: float
     constant: float
@@ -139,8 +139,12 @@ class SceneSolver:
         count = math.ceil(self._digits / (_MIN_IMAGE * self._sigma))
         self._waves = np.arange(1.0, count + 1.0).repeat(2) * np.tile((1.0, -1.0), count)
         self._tables: dict[int, _Tables] = {}
+        self._factorise: Any = None  # with the first table: a guard that solves nothing does not wait for scipy
 
     def _of_order(self, order: int) -> _Tables:
+        from scipy.linalg.lapack import dpotrf
+
+        self._factorise = dpotrf
         rim, binomials = _rim_powers(order)
         near, own = _log_series(2 * order)
         j, n = np.arange(order + 1), np.arange(2 * order + 1)
@@ -372,10 +376,10 @@ class SceneSolver:
         diagonal = matrix.reshape(-1)[:: size + 3]
         diagonal[:first] += 1.0
         diagonal[first:] = 1e30  # only what is left of it is read
-        try:
-            solved = np.linalg.cholesky(matrix)[first:, :first]
-        except np.linalg.LinAlgError:
+        factor, failed = self._factorise(matrix.T, clean=0, overwrite_a=1)  # the lower triangle of rows
+        if failed:
             return Coupling(*np.full((7, 1), math.nan))
+        solved = factor.T[first:, :first]
         last, before = solved[:, first - step :], solved[:, max(first - 2 * step, 0) : first - step]
         gram = solved.dot(solved.T)
         less = gram - last.dot(last.T)
