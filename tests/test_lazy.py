@@ -200,7 +200,7 @@ def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Pa
 @pytest.mark.parametrize("scene", [_STOP, _NO_MESH_FRAME], ids=["a stop", "a retreat without a commissioning"])
 def test_a_reaction_that_only_stops_loads_no_retreat(scene: str, tmp_path: Path) -> None:
     unneeded = {"guard.motion.setpoint_stream", "reaction.motion_choice", "reaction.retreat"}
-    unneeded |= {"reaction.backtrack", "arm.workspace", "ur.input_writers"}
+    unneeded |= {"arm.workspace", "ur.input_writers"}
     loaded = modules(scene, _BUILD, tmp_path / "scene.toml", "")
     assert not known({f"coneskin.robot.{name}" for name in unneeded}) & loaded
 

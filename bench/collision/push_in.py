@@ -33,7 +33,6 @@ from .push_in_cases import ALL_CASES, RandomCollision, case_of, draw
 REACTIONS = {
     "stop": Reaction("stop"),
     "retreat": Reaction("retreat"),
-    "back": Reaction("retreat", on_resistance="back"),
     "comply": Reaction("comply"),
     "slow": Reaction("slow"),
 }

@@ -32,11 +32,11 @@ from .kind import (
     wires,
 )
 from .motion import AHEAD, BEHIND, Touch
-from .setup import BACK, COMPLY, RETREAT, SLOW, Setup
+from .setup import COMPLY, RETREAT, SLOW, Setup
 from .trial import Trial
 
 SLOW_MAY_TAKE = 2.0  # s; an arm that goes on slowly stops when it presses, not before
-REACTIONS = {"retreat": RETREAT, "back": BACK, "comply": COMPLY, "slow": SLOW}
+REACTIONS = {"retreat": RETREAT, "comply": COMPLY, "slow": SLOW}
 SEAM_WIDTH = 0.35  # rad on each side
 SECOND_HAND_DELAY = 0.25  # s; by then an arm that was stopped moves away
 

@@ -221,12 +221,10 @@ class Workspace:
     Attributes:
         model: the arm.
         table: plane below which it must not go, or None.
-        avoid_self: True where the arm's own links count; False on a path along which it has just come.
     """
 
     model: ArmModel
     table: TablePlane | None = None
-    avoid_self: bool = True
 
     def obstruction(self, q: Sequence[float], qd: Sequence[float], braking: float) -> str:
         """Return what is in the way of joints that move so, braking distance included; empty where nothing is.
@@ -239,12 +237,12 @@ class Workspace:
             braking: deceleration of the leading joint [rad/s^2].
         """
         leading = max(map(abs, qd))
-        if not leading or not (self.avoid_self or self.table):
+        if not leading:
             return ""
         ahead = REACTION_TIME + leading / (2.0 * braking)
         there = skeleton(self.model, [angle + ahead * speed for angle, speed in zip(q, qd, strict=True)])
         low = self.table is not None and self.table.below(there)
-        near = _close_pairs(self.model, there) if self.avoid_self else []
+        near = _close_pairs(self.model, there)
         if not (low or near):  # nearly always; then the present skeleton is not needed
             return ""
         here = skeleton(self.model, q)

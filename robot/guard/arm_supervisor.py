@@ -31,7 +31,7 @@ from .speed.speed_reduction import SpeedReduction
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .controller_heartbeat import ControllerHeartbeat
-    from .motion.setpoint_stream import ReactionPlanner
+    from .motion.setpoint_stream import MotionStream, ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 
 __all__ = ["ArmSupervisor"]
@@ -202,14 +202,13 @@ class ArmSupervisor:
                 self._reaction = reaction
                 self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
         elif phase is Phase.RETREATING and began:
-            away.oppose()
             self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
 
     def feed_contacts(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
         """Take what the newest frames say of every touch that there is, at a host time [s]."""
         for contact in contacts:
             self.touch(now, contact, False, out)
-        self._touches.feed(contacts, self.phase in (Phase.STOPPING, Phase.PLACING) and not self.supervision.moved_away)
+        self._touches.feed(contacts, self.phase in (Phase.STOPPING, Phase.PLACING))
         away, state = self._away, self.state
         if self.phase is Phase.RETREATING and state is not None and contacts:
             over = away.resisted(state, now, self._touches.contacts)
@@ -218,7 +217,7 @@ class ArmSupervisor:
 
     def abandon_motion(self, now: float, why: str, out: Outputs) -> None:
         """End the motion away at a host time [s], and let none follow: it cannot be supervised any more."""
-        self._end_motion(now, Cue.ABANDONED, self._away.abandoned(why), out)
+        self._end_motion(now, Cue.ABANDONED, Done(why, self._away.progress), out)
 
     def fault(self, now: float, why: str, out: Outputs) -> None:
         """Stop because something is wrong, and do not move any more."""
@@ -238,7 +237,6 @@ class ArmSupervisor:
         """Take a measured state."""
         self.state = state
         stop, measured_at, phase = self._stop, self.state_age.feed(state), self.supervision.phase
-        self._away.feed(measured_at, state)
         if state.stopped_by_safety or not state.powered:
             self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
         elif self.state_age.stepped:
@@ -299,19 +297,20 @@ class ArmSupervisor:
             emit(out, EventName.STOPPING, now, why=then.why, stop=then.stop, **named)
 
     def _end_motion(self, now: float, cue: Cue, over: Done, out: Outputs) -> None:
-        self._begin_stop(now, EndReaction(self._reaction.deceleration), out)
-        self.supervision, _ = transition(self.supervision, cue, self._away.report(now, over, out))
+        motion = self._begin_stop(now, EndReaction(self._reaction.deceleration), out)
+        assert motion is not None
+        self.supervision, _ = transition(self.supervision, cue, motion.report(now, over, out))
 
-    def _begin_stop(self, now: float, command: StopProgram | EndReaction, out: Outputs) -> None:
+    def _begin_stop(self, now: float, command: StopProgram | EndReaction, out: Outputs) -> MotionStream | None:
         if self._sent:
             self._sent = False
         else:
             self._stop.send(command, out)
         self.speed_reduction.note_stop(self._stop.used)
-        self._away.end(out)
-        state = self.state
+        motion, state = self._away.end(out), self.state
         speed = None if state is None or self.state_age.silent(now) else state.speed
         self._stop.begin(now, speed, command.deceleration)
+        return motion
 
     def _bar(self, why: str) -> None:
         """Let nothing of ours move the arm before the next stop. Who ends a motion under way names the fault."""
@@ -325,9 +324,7 @@ class ArmSupervisor:
         now, enough = self.supervision, self._stop.first_was_enough
         mover = "the driver" if self.internal_control else "a program"
         bar = now.barred or ("" if enough else f"{mover} did not stop the arm")
-        decision = self._away.decide(
-            state, self._reaction, now.may_move, now.moved_away, bar, decide_by, self._touches, out
-        )
+        decision = self._away.decide(state, self._reaction, now.may_move, bar, decide_by, self._touches, out)
         self._reaction = decision.reaction
         if decision.waits:
             self.supervision, _ = transition(now, Cue.WAITS, decide_by=decide_by)

@@ -101,8 +101,6 @@ TRANSITIONS: Final[Mapping[tuple[Phase, Cue], tuple[Phase, Act]]] = {
     (_P.RETREATING, _C.ABANDONED): (_P.HALTING, Act.HALT),
     (_P.RETREATING, _C.TOUCHED): (_P.HALTING, Act.HALT),
     (_P.RETREATING, _C.FAULTED): (_P.HALTING, Act.HALT),
-    (_P.HALTING, _C.WAITS): (_P.PLACING, Act.NONE),
-    (_P.HALTING, _C.MOVES_AWAY): (_P.RETREATING, Act.NONE),
     (_P.HALTING, _C.STAYS): (_P.STANDING, Act.NONE),
     (_P.HALTING, _C.FAULTED): (_P.HALTING, Act.NONE),
     (_P.STANDING, _C.LATCHES): (_P.LATCHED, Act.LATCH),
@@ -123,7 +121,6 @@ class Supervision:
         why: cause of that stop, and what came of it.
         may_move: what stopped the arm lets it move away.
         barred: why nothing of ours moves the arm before the next stop. Empty where something may.
-        moved_away: a motion away has followed this stop.
         decide_by: host time until which an arm that stands waits for the place of a touch [s].
         ending: the guard ends.
     """
@@ -133,7 +130,6 @@ class Supervision:
     why: str = ""
     may_move: bool = False
     barred: str = ""
-    moved_away: bool = False
     decide_by: float = 0.0
     ending: bool = False
 
@@ -159,11 +155,10 @@ def transition(state: Supervision, cue: Cue, what: str = "", decide_by: float = 
         why = state.again(what) if cue is Cue.MOVED else what
         may_move = cue is Cue.TOUCHED
         return Supervision(phase, state.stop + 1, why, may_move, ending=state.ending), act
-    may_move = state.may_move and cue is not Cue.FAULTED and cue is not Cue.ABANDONED
+    may_move = state.may_move and cue is not Cue.FAULTED and act is not Act.HALT  # one motion away for each stop
     why = state.why
     if cue is Cue.FAULTED or cue is Cue.TOUCHED:
         why = what if act is Act.HALT else state.again(what)
     elif what:
         why = f"{why}; {what}"
-    moved_away = state.moved_away or act is Act.HALT
-    return replace(state, phase=phase, why=why, may_move=may_move, moved_away=moved_away, decide_by=decide_by), act
+    return replace(state, phase=phase, why=why, may_move=may_move, decide_by=decide_by), act

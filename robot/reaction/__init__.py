@@ -1,1 +1,1 @@
-"""Reactions to a touch: retreat, admittance, backtrack and the rules that choose one. Pure functions."""
+"""Reactions to a touch: retreat, admittance and the rules that choose one. Pure functions."""

@@ -17,8 +17,6 @@ __all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "React
 
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
-#: what follows where a motion away is resisted
-_RESISTANCE_CHOICES = ("stop", "back")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +73,6 @@ class Reaction:
         time_budget: after which the retreat ends wherever it is; a touch that slows for longer stops the arm [s].
         arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
         arm_distance: that no point of the bare arm goes from where the motion began [m].
-        on_resistance: where the touch does not become lighter, or another one comes, "stop" stays there, and "back"
-            goes back the way of the retreat, not beyond where it began, if that leads into no touch.
         full_level: level at which comply gives way with its full speed.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
@@ -95,16 +91,14 @@ class Reaction:
     time_budget: float = 2.0
     arm_speed: float = 0.25
     arm_distance: float = 0.1
-    on_resistance: str = "stop"
     full_level: float = 0.6
     slow_to: float = 0.2
     slow_speed: float = 0.05
     press: float = 0.0005
 
     def __post_init__(self) -> None:
-        for name, choices in (("kind", KINDS), ("on_resistance", _RESISTANCE_CHOICES)):
-            if (word := getattr(self, name)) not in choices:
-                raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")
+        if self.kind not in KINDS:
+            raise RobotRefused(f"reaction kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
         # 40 rad/s^2 is the most that the UR driver lets through; 1.5 m/s the fastest tool of that family
         for name, unit, most in (
             ("deceleration", "rad/s^2", 40.0),
@@ -154,10 +148,8 @@ class Done:
         reason: why.
         progress: how far the touched point got [m].
         complete: it got as far as it was to.
-        resisted: something was in the way: a touch, or a force on the joints.
     """
 
     reason: str
     progress: float = 0.0
     complete: bool = False
-    resisted: bool = False

@@ -45,39 +45,27 @@ class MotionAway:
     def __init__(self, planner: ReactionPlanner | None) -> None:
         self._planner = planner
         self._stream: MotionStream | None = None
-        self._newest: MotionStream | None = None
-        self._resisted: MotionStream | None = None  # that has ended because something was in its way
         self._at_touch: ArmState | None = None
-
-    @property
-    def under_way(self) -> bool:
-        """True while the arm moves away."""
-        return self._stream is not None
 
     @property
     def yields(self) -> bool:
         """True while it gives way to a push: touches are what that follows."""
         return self._stream is not None and self._stream.how == "push"
 
-    def feed(self, measured_at: float, state: ControllerState) -> None:
-        """Take a measured state, and the host time of its measurement [s]."""
-        if self._planner is not None:
-            self._planner.feed(measured_at, state.q)
+    @property
+    def progress(self) -> float:
+        """How far it has got [m]."""
+        return 0.0 if self._stream is None else self._stream.progress
 
     def prepare(self, state: ControllerState | None) -> None:
         """Begin with a new stop, from the state in which its cause was seen."""
         self._at_touch = None if state is None else ArmState(state.time, state.q, state.qd)
-
-    def abandoned(self, why: str) -> Done:
-        """Return the end of the motion under way, before it was made."""
-        return Done(why, 0.0 if self._stream is None else self._stream.progress)
 
     def decide(
         self,
         state: ControllerState,
         reaction: Reaction,
         permitted: bool,
-        moved_away: bool,
         bar: str,
         decide_by: float,
         touches: TouchRecord,
@@ -89,72 +77,40 @@ class MotionAway:
             state: as measured.
             reaction: the one that is under way.
             permitted: what stopped the arm lets it move away.
-            moved_away: a motion away has followed this stop.
             bar: why nothing of ours moves the arm. Empty where something may.
             decide_by: host time until which the place of a touch may become certain [s].
             touches: what it reacts to.
             out: takes commands and events.
         """
-        resisted = self._resisted
-        answers = resisted.answered if resisted else not moved_away
-        wanted = permitted and answers and bool(touches.placed)
+        wanted = permitted and bool(touches.placed)
         if wanted:
-            hardest = touches.hardest()  # how firm it was shows by now
-            if not resisted or hardest.kind == "stop":
-                reaction = hardest
+            reaction = touches.hardest()  # how firm it was shows by now
         wanted = wanted and reaction.kind not in ("stop", "slow")
         if wanted and not bar and not touches.all_placed and state.time < decide_by:
             return _Decision(reaction, waits=True)
-        self._resisted = None
         if not wanted:
             return _Decision(reaction)
         if bar:
             return _Decision(reaction, refusal=f"no retreat: {bar}")
-        refusal = self._begin(state, reaction, touches, resisted, out)
-        return _Decision(reaction, begun=not refusal, refusal=refusal)
-
-    def _begin(
-        self,
-        state: ControllerState,
-        reaction: Reaction,
-        touches: TouchRecord,
-        resisted: MotionStream | None,
-        out: Outputs,
-    ) -> str:
         assert self._planner is not None
         here = ArmState(state.time, state.q, state.qd)
-        if resisted:
-            what, stream = "way back", self._planner.go_back(reaction, here, touches.contacts, resisted.began, out)
-        else:
-            at_touch = self._at_touch or here
-            what, stream = "retreat", self._planner.begin(reaction, at_touch, here, touches.placed, out)
+        stream = self._planner.begin(reaction, self._at_touch or here, here, touches.placed, out)
         if isinstance(stream, str):
-            return f"no {what}: {stream}"
-        self._stream = self._newest = stream
-        return ""
+            return _Decision(reaction, refusal=f"no retreat: {stream}")
+        self._stream = stream
+        return _Decision(reaction, begun=True)
 
     def update(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on from a measured state, or return Done where the motion is over."""
-        if self._stream is None:
-            return None
-        return self._stream.update(state, contacts, out)
+        return None if self._stream is None else self._stream.update(state, contacts, out)
 
     def resisted(self, state: ControllerState, now: float, contacts: Sequence[ContactOnLink]) -> Done | None:
         """Return Done where the newest frames, of a host time [s], show that the motion must end."""
         return None if self._stream is None else self._stream.resisted(now, state.q, contacts)
 
-    def oppose(self) -> None:
-        """Note that something is in the way of the motion: another may follow it."""
-        self._resisted = self._stream
-
-    def report(self, now: float, over: Done, out: Outputs) -> str:
-        """Report the end of the newest motion at a host time [s], after its stop was sent, and return it in words."""
-        assert self._newest is not None
-        self._resisted = self._newest if over.resisted else None
-        return self._newest.report(now, over, out)
-
-    def end(self, out: Outputs) -> None:
-        """Void the setpoints, after a stop has been sent."""
-        if self._stream is not None:
-            self._stream.end(out)
-        self._stream = None
+    def end(self, out: Outputs) -> MotionStream | None:
+        """Void the setpoints, after a stop has been sent. Return the motion that was under way."""
+        stream, self._stream = self._stream, None
+        if stream is not None:
+            stream.end(out)
+        return stream

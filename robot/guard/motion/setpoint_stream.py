@@ -15,9 +15,8 @@ from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
 from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_way, emit
-from coneskin.robot.reaction.backtrack import PathHistory
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
-from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_motion, plan_way_back
+from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_motion
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
@@ -88,7 +87,7 @@ _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will 
 
 
 class ReactionPlanner:
-    """Planner that knows where the arm has been and begins the motion that a reaction wants.
+    """Planner that begins the motion that a reaction wants.
 
     Args:
         model: the arm.
@@ -101,11 +100,6 @@ class ReactionPlanner:
         self._watchdog_hz = watchdog_hz
         self._token = 0
         self._workspace = Workspace(model, table)
-        self._history = PathHistory()
-
-    def feed(self, time: float, q: Joints) -> None:
-        """Take measured joint positions [rad] of a time [s]."""
-        self._history.update(time, q)
 
     def begin(
         self,
@@ -127,25 +121,7 @@ class ReactionPlanner:
         motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
-        answered = reaction.kind == "retreat" and reaction.on_resistance == "back"
-        return self._stream(motion, reaction, here, contacts, answered, out)
-
-    def go_back(
-        self, reaction: Reaction, here: ArmState, contacts: Sequence[ContactOnLink], since: float, out: Outputs
-    ) -> MotionStream | str:
-        """Begin to go back the way of a retreat that was resisted, or return why that cannot be.
-
-        Args:
-            reaction: the settings.
-            here: the arm now, standing.
-            contacts: the touches there are now.
-            since: when the motion away began [s].
-            out: takes commands and events.
-        """
-        motion = plan_way_back(self._model, reaction, here, contacts, self._history, self._workspace, since)
-        if isinstance(motion, str):
-            return motion
-        return self._stream(motion, reaction, here, contacts, False, out)
+        return self._stream(motion, reaction, here, contacts, out)
 
     def _stream(
         self,
@@ -153,7 +129,6 @@ class ReactionPlanner:
         reaction: Reaction,
         here: ArmState,
         contacts: Sequence[ContactOnLink],
-        answered: bool,
         out: Outputs,
     ) -> MotionStream:
         supervision = ContactSupervision(self._model, here.q, contacts, motion.how == "push")
@@ -161,7 +136,7 @@ class ReactionPlanner:
         if self._watchdog_hz is not None:
             self._token += 1
             program = SetpointProgram(self._token, reaction.deceleration, self._watchdog_hz)
-        return MotionStream(motion, supervision, here.time, program, answered, out)
+        return MotionStream(motion, supervision, here.time, program, out)
 
 
 class MotionStream:
@@ -172,14 +147,11 @@ class MotionStream:
         supervision: of the touches meanwhile.
         now: host time [s].
         program: that follows the setpoints. None where the driver process does.
-        answered: True where another motion follows if this one is resisted.
         out: takes commands and events.
 
     Attributes:
         how: as of the motion.
-        began: when [s].
         progress: how far it has got [m].
-        answered: as given.
     """
 
     def __init__(
@@ -188,16 +160,14 @@ class MotionStream:
         supervision: ContactSupervision,
         now: float,
         program: SetpointProgram | None,
-        answered: bool,
         out: Outputs,
     ) -> None:
         self._motion = motion
         self._supervision = supervision
-        self.answered = answered
         self.progress = 0.0
         self.how = motion.how
         self._program = program
-        self.began = now
+        self._began = now
         self._sent = -math.inf
         self._braking: float | None = None  # how far the touched surface went on until this began [m]
         self._following_error = _FollowingErrorMonitor(now)
@@ -218,7 +188,7 @@ class MotionStream:
             contacts: the touches there are, by the newest frame of each.
         """
         why = self._supervision.resistance(now, q, contacts)
-        return Done(why, self.progress, resisted=True) if why else None
+        return Done(why, self.progress) if why else None
 
     def update(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
         """Go on, or return Done where the motion is over.
@@ -237,10 +207,10 @@ class MotionStream:
         if contacts and (over := self.resisted(state.time, state.q, contacts)) is not None:
             return over
         if self._currents is not None and (why := self._currents.resistance(state)):
-            return Done(why, step.progress, resisted=True)
+            return Done(why, step.progress)
         program, first = self._program, self._sent == -math.inf
         exceeded = self._following_error.exceeded(state, step.progress)
-        started = state.program_running or state.time - self.began < _START_TIMEOUT
+        started = state.program_running or state.time - self._began < _START_TIMEOUT
         if program is not None and not state.program_running and (exceeded or not started):
             return Done("its program does not run on the controller", step.progress)
         if exceeded:

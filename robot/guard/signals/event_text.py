@@ -102,9 +102,7 @@ def _words(event: GuardEvent) -> str:
         case EventName.RESUMED:
             text = f"no touch any more: speed slider back to {100.0 * d['slider']:.0f} %"
         case EventName.RETREATING if "how" in d:
-            text = {"path": "going back along the path on which the arm came", "push": "giving way to the push"}[
-                d["how"]
-            ]
+            text = {"push": "giving way to the push"}[d["how"]]
         case EventName.WAITING:
             text = "waiting: " + "; ".join(d["reasons"])
         case EventName.NOT_COMMISSIONED:

@@ -23,9 +23,6 @@ _HEARTBEAT_WORDS = {
     "optional": "NOT REQUIRED: a program without the lines of coneskin heartbeat goes on if the network is cut",
 }
 
-#: reaction.on_resistance -> what it means
-_RESISTANCE_WORDS = {"stop": "stay", "back": "go back the way of the retreat"}
-
 
 def missing_parts(scene: Scene) -> list[str]:
     """Return what has to be added before the scene can be guarded, one line each."""
@@ -126,7 +123,7 @@ def _reaction(reaction: Reaction) -> str:
     )
     if reaction.kind == "comply":
         return f"{text}, with full speed at level {reaction.full_level:g}"
-    return f"{text}; where the touch resists: {_RESISTANCE_WORDS[reaction.on_resistance]}"
+    return text
 
 
 def _conditions(rule: Rule) -> str:

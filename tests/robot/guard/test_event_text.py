@@ -99,11 +99,8 @@ def test_its_line(name: str) -> None:
     assert describe(GuardEvent(EventName(name), 1001.25, details), 1000.0) == f"   1.2500 s  {words}"
 
 
-@pytest.mark.parametrize(
-    ("how", "words"), [("path", "going back along the path on which the arm came"), ("push", "giving way to the push")]
-)
-def test_how_it_moves_away(how: str, words: str) -> None:
-    assert describe(GuardEvent("retreating", 1.0, {"how": how}), 1.0).endswith(f"  {words}")
+def test_how_it_moves_away() -> None:
+    assert describe(GuardEvent("retreating", 1.0, {"how": "push"}), 1.0).endswith("  giving way to the push")
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_after_a_fault_nothing_of_ours_moves_the_arm_until_the_next_stop() -> No
 
 def test_a_motion_away_begins_only_from_a_standstill_after_a_stop() -> None:
     begins = {at for (at, _), (to, _) in TRANSITIONS.items() if to is Phase.RETREATING}
-    assert begins == {Phase.STOPPING, Phase.HALTING, Phase.PLACING}
+    assert begins == {Phase.STOPPING, Phase.PLACING}
 
 
 def test_a_cue_without_a_row_changes_nothing() -> None:

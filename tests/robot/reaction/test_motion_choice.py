@@ -1,4 +1,4 @@
-"""Ways to leave: with the push, back along the path, above the table; the kinematics judge."""
+"""Ways to leave: with the push, above the table; the kinematics judge."""
 
 import math
 from dataclasses import replace
@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.arm.workspace import _LIMIT_MARGIN, TablePlane, Workspace, skeleton
-from coneskin.robot.reaction.backtrack import BacktrackPlan, PathHistory, backtrack_step, plan_backtrack
+from coneskin.robot.arm.workspace import TablePlane, Workspace, skeleton
 from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
@@ -152,75 +151,6 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 4.0, ("level",))
 
 
-# ---- back along the path
-
-
-def trail_of(points):
-    history = PathHistory()
-    for k, q in enumerate(points):
-        history.update(0.002 * k, q)
-    return history
-
-
-def arc(length, count=400):
-    """A way of two joints that is not straight."""
-    return [
-        tuple(
-            a + b for a, b in zip(Q, (length * s, 0.2 * math.sin(4 * length * s), 0.0, 0.1 * s, 0.0, 0.0), strict=True)
-        )
-        for s in (k / count for k in range(count + 1))
-    ]
-
-
-@pytest.mark.long
-@given(st.floats(0.1, 1.5), st.floats(0.02, 0.3))
-@settings(max_examples=12)
-def test_it_stays_on_the_way_and_no_point_goes_farther_than_the_distance(length, distance):
-    way = arc(length)
-    reaction = Reaction(kind="retreat", distance=distance, time_budget=10.0, arm_distance=1.0)
-    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), reaction)
-    assert isinstance(plan, BacktrackPlan)
-    states, over = follow(lambda state: backtrack_step(plan, state), way[-1], 1.0, longest=11.0)
-    assert isinstance(over, Done), "it never ends"
-    for state in states[::10]:
-        # a centimetre ahead at most, at 1 m of reach or so: corners are cut by a part of 0.01 rad
-        assert min(max(abs(a - b) for a, b in zip(state.q, q, strict=True)) for q in way) < 0.01
-    here, there = (skeleton(ARM, state.q) for state in (states[0], states[-1]))
-    farthest = max(math.dist(a, b) for a, b in zip(here, there, strict=True))
-    assert farthest <= distance + 1e-4
-    assert over.complete == (plan.lengths[-1] >= distance)
-
-
-def test_an_arm_off_its_way_does_not_go_back():
-    way = arc(1.0)
-    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), Reaction(kind="retreat"))
-    off = tuple(a + 0.06 for a in way[-1])
-    assert "rad off the way" in backtrack_step(plan, ArmState(1.0, off)).reason
-
-
-@pytest.mark.parametrize("points", [[], [Q], [Q] * 500])
-def test_an_arm_that_has_not_come_from_anywhere(points):
-    assert plan_backtrack(ARM, ArmState(1.0, Q), trail_of(points), Reaction(kind="retreat")) == Done(
-        "the arm has not come from anywhere"
-    )
-
-
-def test_a_trail_forgets():
-    history = trail_of(arc(1.0))
-    assert history.since(100.0) == []
-    for k in range(100_000):
-        history.update(float(k), (0.01 * k, 0, 0, 0, 0, 0))
-    assert len(history.since(-math.inf)) == 2000
-
-
-def test_a_joint_at_its_limit_ends_the_way_back():
-    top = ARM.joint_upper[2] - _LIMIT_MARGIN
-    way = [(*Q[:2], top + 0.015 - 0.001 * k, *Q[3:]) for k in range(100)]  # it came from beyond the margin
-    plan = plan_backtrack(ARM, ArmState(1.0, way[-1]), trail_of(way), Reaction(kind="retreat", distance=0.3))
-    _, over = follow(lambda state: backtrack_step(plan, state), way[-1], 1.0)
-    assert over.reason == "joint 3 is at its limit on the way back"
-
-
 # ---- the table
 
 
@@ -230,7 +160,7 @@ def test_a_joint_at_its_limit_ends_the_way_back():
 @settings(max_examples=20)
 def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     contact = ContactOnLink(3, (0.2, 0.0, 0.0), unit(normal))
-    space = Workspace(ARM, TablePlane(height), avoid_self=False)
+    space = Workspace(ARM, TablePlane(height))
     plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
     assume(not isinstance(plan, Done))
     states, over = follow(lambda state: _PlannedMotion(plan).update(state, ()), q)

@@ -45,7 +45,6 @@ REACTIONS = {
     "slow": 'kind = "slow"\ntime_budget_s = 1\npress_mm = 50',
     "comply": 'kind = "comply"\ndistance_mm = 20',
     "retreat": 'kind = "retreat"\ndistance_mm = 20',
-    "retreat, back": 'kind = "retreat"\ndistance_mm = 20\non_resistance = "back"',
 }
 CONTROLS = ("internal", "external")
 _SENSOR_TEXT = """\
@@ -270,13 +269,13 @@ class GuardWorld:
         facts += [bool(core._faults), activation.resetting, activation._released_at is None, judge.waiting < math.inf]
         facts += [(detector.ready, detector.touched) for detector in core._stream.detectors]
         facts += [tuple(core._companions._silent), bool(arm.state_age.trouble(self.now)), arm.backup_ready]
-        stop, away, slow = arm._stop, arm._away, arm.speed_reduction
+        stop, slow = arm._stop, arm.speed_reduction
         facts += [slow.now is None, slow._halted_from is None]
         if core.phase not in _RESTING:
             facts += [stop.watch.insists, len(arm._touches.contacts), arm._reaction.kind]
             if moves:
                 now = arm.supervision
-                facts += [now.may_move, now.moved_away, bool(now.barred), away._resisted is None]
+                facts += [now.may_move, bool(now.barred)]
             if (monitor := stop._monitor) is not None:
                 facts += [monitor.used[-1:] == monitor.used, StopPath.PROTECTIVE in monitor.used]
         return tuple(facts)

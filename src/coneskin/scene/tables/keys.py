@@ -144,8 +144,6 @@ _REACTION_SETTINGS = with_meanings(
     arm_distance_mm: distance that no point of the bare arm goes from where the retreat began. The tool is not
         known. Points farther out from the joints that turn go farther than the touched point. So a retreat from a
         touch near a joint mostly ends here, before `distance_mm`
-    on_resistance: where the touch does not become lighter, or another comes: stay, or go back the way of the
-        retreat, but not beyond its beginning and into no touch
     full_level: level of the touch at which comply gives way with all of `speed_mm_s`
     slow_to: position of the controller's speed slider while slow
     slow_speed_mm_s: speed of the touched surface below which the arm counts as slow, whatever it was before. From
@@ -160,7 +158,6 @@ _REACTION_SETTINGS = with_meanings(
     Key("time_budget_s", float, None, low=0.05, high=60.0),
     Key("arm_speed_mm_s", float, None, low=1.0, high=5000.0),
     Key("arm_distance_mm", float, None, low=1.0, high=2000.0),
-    Key("on_resistance", str, None, choices=("stop", "back")),
     Key("full_level", float, None, low=0.01, high=1.0),
     Key("slow_to", float, None, low=0.05, high=0.9),
     Key("slow_speed_mm_s", float, None, low=1.0, high=1500.0),
