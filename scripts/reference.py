@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import argparse
 import ast
-import importlib
+import importlib.util
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +23,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "look-up"
+STUBS = ROOT / "src" / "coneskin" / "session" / "ur_rtde_methods.pyi"
 #: first folder of a public name's module -> its group
 GROUPS = {
     "design": "design",
@@ -143,7 +145,7 @@ def name_table() -> str:
 # ur_rtde
 
 
-def wheel_methods() -> dict[str, list[str]]:
+def _wheel_interfaces() -> dict[type, list[str]]:
     """Return the interfaces of the ur_rtde wheel that is installed, and the public methods of each."""
     import rtde_control
     import rtde_io
@@ -151,11 +153,14 @@ def wheel_methods() -> dict[str, list[str]]:
 
     interfaces = (rtde_control.RTDEControlInterface, rtde_receive.RTDEReceiveInterface, rtde_io.RTDEIOInterface)
     return {
-        interface.__name__: [
-            name for name in dir(interface) if name[0].islower() and callable(getattr(interface, name))
-        ]
+        interface: [name for name in dir(interface) if name[0].islower() and callable(getattr(interface, name))]
         for interface in interfaces
     }
+
+
+def wheel_methods() -> dict[str, list[str]]:
+    """Return the public methods of each interface of the wheel."""
+    return {interface.__name__: names for interface, names in _wheel_interfaces().items()}
 
 
 def method_table() -> str:
@@ -176,6 +181,61 @@ def method_table() -> str:
             lines.append(f"| {', '.join(alike)} | {own} | {note} |".replace("|  |", "| |"))
         lines.append("")
     return "\n".join(lines).rstrip("\n") + "\n"
+
+
+_STUB_HEAD = '''"""Methods of ur_rtde on ``session.arm``, for type checkers and editors. Made by scripts/reference.py."""
+
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import NoReturn, overload
+
+from typing_extensions import deprecated
+
+class _AsyncOperationStatus:
+    def isAsyncOperationRunning(self) -> bool: ...
+    def progress(self) -> int: ...
+
+class UrRtdeMethods:
+'''
+
+
+def method_stubs() -> str:
+    """Return ur_rtde's methods on the arm for a type checker, with the signatures of the wheel, which it needs."""
+    from coneskin.session.ur_rtde_names import NAMES, REFUSALS
+
+    lines = {}
+    for interface, names in _wheel_interfaces().items():
+        for name in names:
+            if name in REFUSALS:
+                lines[name] = [f"@deprecated({json.dumps(f'refused: {REFUSALS[name]}')})"]
+                lines[name] += [f"def {name}(self, *args: object, **kwargs: object) -> NoReturn: ..."]
+                continue
+            found = re.findall(rf"^(?:\d\. )?{name}(\(self: .*\) -> .*)$", getattr(interface, name).__doc__, re.M)
+            said = "; ".join(filter(None, (NAMES[name].own, NAMES[name].note)))
+            lines[name] = []
+            for signature in found:
+                lines[name] += ["@overload"] if len(found) > 1 else []
+                lines[name] += [f"def {name}{_stub_signature(signature)}:", f'    """In coneskin: {said}."""']
+    return _STUB_HEAD + "".join(f"    {line}\n" for name in sorted(lines) for line in lines[name])
+
+
+def _stub_signature(text: str) -> str:
+    """Return a signature of the wheel as a stub has it: any sequence will do, and arg0 is given by its place."""
+    function = ast.parse(f"def f{text}: ...").body[0]
+    assert isinstance(function, ast.FunctionDef)
+    given = function.args
+    with_default = len(given.args) - len(given.defaults)
+    arguments = ["self"]
+    for number, argument in enumerate(given.args[1:], 1):
+        kind = _stub_type(argument.annotation).replace("list[", "Sequence[")
+        arguments.append(f"{argument.arg}: {kind}{' = ...' if number >= with_default else ''}")
+    arguments += ["/"] if "arg0" in text else []
+    return f"({', '.join(arguments)}) -> {_stub_type(function.returns)}"
+
+
+def _stub_type(kind: ast.expr | None) -> str:
+    assert kind is not None
+    return ast.unparse(kind).replace("rtde_control.Async", "_Async").replace("datetime.", "")
 
 
 # promises
@@ -252,13 +312,15 @@ def main() -> int:
         print(SHOWN[args.show](), end="")
         return 0
     stale = []
-    for name in PARTS:
-        made = page(name)
-        if made != (PAGES / name).read_text(encoding="utf-8"):
+    made = {PAGES / name: page(name) for name in PARTS}
+    if importlib.util.find_spec("rtde_control"):  # the wheel itself says what its methods take
+        made[STUBS] = method_stubs()
+    for path, text in made.items():
+        if text != path.read_text(encoding="utf-8"):
             if args.check:
-                stale.append(f"{name}: run python scripts/reference.py")
+                stale.append(f"{path.name}: run python scripts/reference.py")
             else:
-                (PAGES / name).write_text(made, encoding="utf-8")
+                path.write_text(text, encoding="utf-8")
     if stale:
         print(*stale, sep="\n", file=sys.stderr)
     return bool(stale)

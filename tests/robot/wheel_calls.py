@@ -187,10 +187,12 @@ def questions(host: str, q: Joints, tool: Joints) -> dict[str, Any]:
     receive = _receive(host)
     control = _control(host)
     out: dict[str, Any] = {"q": receive.getActualQ()}
+    without_tool = receive.getActualTCPPose()
     out["fk_tool"] = control.getForwardKinematics(q, tool)
     out["setTcp"] = control.setTcp(tool)
     out["tcp_offset"] = control.getTCPOffset()
     out["fk_here"] = control.getForwardKinematics()
+    _until(lambda: receive.getActualTCPPose() != without_tool)  # states that have the tool come later
     out["pose"] = receive.getActualTCPPose()
     out["ik"] = control.getInverseKinematics(out["pose"])
     out["ik_near"] = control.getInverseKinematics(out["fk_tool"], q)

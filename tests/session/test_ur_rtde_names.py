@@ -4,6 +4,9 @@ import ast
 import importlib.util
 import inspect
 import re
+import subprocess
+import sys
+from pathlib import Path
 from unittest.mock import Mock, call
 
 import pytest
@@ -99,3 +102,21 @@ def test_a_list_of_lists_is_a_path_and_a_move_waits_unless_it_is_told_not_to(nam
         call.move_path([make(point, 0.5, 2.0, 0.02)], wait=True),
         call.move_path([make(point, 0.5, 2.0, 0.0)], wait=False),
     ]
+
+
+@pytest.mark.long
+def test_a_type_checker_knows_what_each_method_takes_and_which_are_refused(tmp_path: Path) -> None:
+    """mypy, strictly, on a program as docs/do/ur-rtde.md converts one."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        'import coneskin as cs\n\ncontrol = cs.guard("scene.toml").open().arm\n'
+        "control.moveJ([*control.getActualQ()], 1.0, 1.4)\ncontrol.moveL([[0.0] * 9], True)\n"
+        "running: bool = control.getAsyncOperationProgressEx().isAsyncOperationRunning()\n"
+        "control.moveX([0.0] * 6)\ncontrol.moveL(3)\ncontrol.forceMode()\n"
+    )
+    done = subprocess.run([sys.executable, "-m", "mypy", str(program)], cwd=ROOT, capture_output=True, text=True)
+    assert re.findall(r"program\.py:(\d+): error: .*\[(.*)\]", done.stdout) == [
+        ("7", "attr-defined"),
+        ("8", "call-overload"),
+        ("9", "deprecated"),
+    ], done.stdout + done.stderr

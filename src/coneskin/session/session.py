@@ -26,7 +26,6 @@ from coneskin.scene.settings import resolved_settings
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.values.scene import Scene
 
-from .arm_client import ArmClient
 from .child_processes import ChildProcesses
 from .event_log import EventLog, discard_recording, new_recording
 from .guard_monitor import FallbackStop, GuardMonitor
@@ -34,6 +33,8 @@ from .outcome import activation_error, await_outcome, braking_time, exit_error, 
 
 if TYPE_CHECKING:
     import socket
+
+    from .ur_rtde_names import UrRtdeArm
 
 __all__ = ["Session", "guard"]
 
@@ -101,7 +102,7 @@ class Session:
         self._log = EventLog()
         self._monitor: GuardMonitor | None = None
         self._processes = ChildProcesses()
-        self._arm: ArmClient | None = None
+        self._arm: UrRtdeArm | None = None
         self._resets = 0  # asked for so far
 
     @property
@@ -115,7 +116,7 @@ class Session:
         return self._log.began
 
     @property
-    def arm(self) -> ArmClient:
+    def arm(self) -> UrRtdeArm:
         """Arm for the program.
 
         Raises:

@@ -19,6 +19,11 @@ from coneskin.robot.driver.values import Waypoint
 
 from .arm_client import ArmClient
 
+if TYPE_CHECKING:  # a file of stubs alone, which scripts/reference.py makes from the wheel and the tables below
+    from .ur_rtde_methods import UrRtdeMethods
+else:
+    UrRtdeMethods = object
+
 __all__ = ["NAMES", "REFUSALS", "UrRtdeArm"]
 
 _SPEED_HOLD_TIME = (
@@ -30,7 +35,7 @@ _CYCLE_TIME = 0.002  # s, of the controller
 _PROTECTIVE_BIT, _EMERGENCY_BIT = 1 << 2, 1 << 7  # bits of safety_status_bits
 
 
-class UrRtdeArm(ArmClient):
+class UrRtdeArm(ArmClient, UrRtdeMethods):
     """Arm of a guarded program that answers to the methods of ur_rtde as well."""
 
     if not TYPE_CHECKING:  # a type checker shall find a name that is misspelt
