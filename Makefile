@@ -8,9 +8,9 @@
 # make check-compiled  the short tests, and all bit-exact replays, on a compiled copy in build/compiled
 VENV ?= .venv
 BIN := $(VENV)/bin
-# ur-rtde ships wheels for Python 3.11 and 3.12
-PYTHON ?= $(shell for p in python3.12 python3.11 python3; do \
-	$$p -c 'import sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' 2>/dev/null && echo $$p && break; done)
+# 3.12 and 3.11 first, for which ur-rtde ships wheels
+PYTHON ?= $(shell for p in python3.12 python3.11 python3 python3.13 python3.14; do \
+	$$p -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
 
 # hundreds of Python processes start in the tests: without bytecode on the disk each of them compiles all modules anew
 export PYTHONDONTWRITEBYTECODE :=
@@ -54,12 +54,12 @@ check-compiled: $(VENV)/dev.stamp build/compiled/done
 	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH="$(CURDIR)/build/compiled" scripts/tests "not long"
 
 $(VENV)/bin/python:
-	@test -n "$(PYTHON)" || { echo "coneskin needs Python 3.11 or 3.12 with venv: name one with make PYTHON=..."; exit 1; }
+	@test -n "$(PYTHON)" || { echo "coneskin needs Python 3.11 or newer with venv: name one with make PYTHON=..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	@echo "installing, about a minute"
-	$(BIN)/python -m pip install -q -e '.[pictures,design]' pytest
+	$(BIN)/python -m pip install -q --no-compile -e '.[pictures,design]' pytest
 	touch $@
 
 $(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml setup.py

@@ -183,7 +183,7 @@ def method_table() -> str:
     return "\n".join(lines).rstrip("\n") + "\n"
 
 
-_STUB_HEAD = '''"""Methods of ur_rtde on ``session.arm``, for type checkers and editors. Made by scripts/reference.py."""
+_STUB_HEAD = '''"""Methods of ur_rtde on ``session.arm``, for type checkers. Made by scripts/reference.py."""
 
 from collections.abc import Sequence
 from datetime import timedelta

@@ -16,6 +16,7 @@ The only file that imports the wheel.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -33,6 +34,7 @@ __all__ = [
     "Mode",
     "UrArm",
     "stop_time",
+    "wheel_remedy",
 ]
 
 _START_TIMEOUT = 2.0  # s for the control program to start; ur_rtde itself allows 5
@@ -69,6 +71,23 @@ _QUESTION_WORDS = (
     *("getTargetWaypoint", "getActualJointPositionsHistory", "getActualToolFlangePose", "getTargetJointAccelerations"),
     *("getJacobian", "getJacobianTimeDerivative", "getMassMatrix", "getCoriolisAndCentrifugalTorques"),
 )
+
+
+def wheel_remedy(python: tuple[int, ...] = sys.version_info[:2], system: str = "") -> str:
+    """Return how a computer gets the wheel: by pip where there is one, and never by a build from C++ sources.
+
+    Args:
+        python: version of the interpreter.
+        system: platform, as sysconfig names it; empty for this one.
+    """
+    from sysconfig import get_platform
+
+    if python in ((3, 11), (3, 12)) and (system or get_platform()) in ("linux-x86_64", "win-amd64"):
+        return "pip install ur-rtde"
+    return (
+        "it has wheels for Python 3.11 and 3.12 on x86-64 Linux and Windows only: take one of these, or let another "
+        'program move the arm with control = "external" in [arm]'
+    )
 
 
 def stop_time(deceleration: float) -> float:
@@ -120,7 +139,7 @@ class UrArm:
         try:
             import rtde_control  # type: ignore[import-not-found,unused-ignore]
         except ImportError as exc:
-            raise MissingExtra("ur-rtde", "moving a UR arm (wheels exist for Python 3.11 and 3.12 on x86-64)") from exc
+            raise MissingExtra("ur-rtde", "moving a UR arm", remedy=wheel_remedy()) from exc
         self.wheel = rtde_control
         with _rtde_errors(f"connecting ur_rtde to {self.host}"):
             self.control = rtde_control.RTDEControlInterface(self.host)

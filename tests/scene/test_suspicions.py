@@ -6,10 +6,12 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.core.errors import SceneError
+from coneskin.core.errors import MissingExtra, SceneError
+from coneskin.robot.ur.ur_rtde import wheel_remedy
 from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.suspicions import suspicions
+from coneskin.session.session import guard
 from coneskin.testing.scenes import forearm_scene
 
 from .scenes import DOCUMENT
@@ -91,7 +93,22 @@ def test_a_wrap_in_radians_is_refused_with_what_to_write() -> None:
 
 def test_missing_packages_are_named_together(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(required_packages, "find_spec", lambda _: None)
+    monkeypatch.setattr(required_packages, "wheel_remedy", lambda: wheel_remedy((3, 12), "linux-x86_64"))
     assert doubts(PLAIN) == ["2 packages that it needs are not installed: pip install pyserial ur-rtde"]
+
+
+@pytest.mark.parametrize(
+    "computer", [((3, 13), "linux-x86_64"), ((3, 12), "macosx-11.0-arm64"), ((3, 12), "linux-aarch64")]
+)
+def test_where_ur_rtde_has_no_wheel_nobody_is_led_to_build_one(
+    monkeypatch: pytest.MonkeyPatch, computer: tuple[tuple[int, int], str]
+) -> None:
+    monkeypatch.setattr(required_packages, "find_spec", lambda _: None)
+    monkeypatch.setattr(required_packages, "wheel_remedy", lambda: wheel_remedy(*computer))
+    (told,) = doubts(PLAIN)
+    assert "pip install pyserial; ur-rtde: it has wheels for Python 3.11 and 3.12" in told
+    with pytest.raises(MissingExtra, match='control = "external"'):
+        guard(parse_scene(PLAIN))
 
 
 def test_check_prints_them_and_still_passes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

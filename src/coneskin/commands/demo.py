@@ -1,7 +1,8 @@
 """``coneskin demo``: the skin of a simulated arm is touched, and the arm stops and retreats. No hardware.
 
 A script touches the skin. Everything else is the real thing: bytes through a pseudo-terminal and pyserial, the guard in
-its own process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay.
+its own process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay. On a
+computer for which there is no such wheel, a URScript program moves the arm.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 import json
 import math
 import shlex
+import socket
 import sys
 import threading
 import time
@@ -17,13 +19,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import (
-    Collision,
-    ConeSkinError,
-    MissingExtra,
-    RecordingError,
-    RobotRefused,
-)
+from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RecordingError, RobotRefused
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 
@@ -36,6 +32,7 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.runs.replay.run import Run
     from coneskin.scene.values.scene import Scene
+    from coneskin.session.session import Session
 
 __all__ = ["add_arguments", "run"]
 
@@ -45,6 +42,7 @@ _SCENE_TEXT = """\
 [arm]
 model = "UR5e"
 host = "{host}"
+control = "{control}"
 
 [[link]]
 name = "forearm"
@@ -155,7 +153,7 @@ def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     print("\nafter the touch began:")
     for key, words in (
         ("frame_ms", "frame over the threshold decoded"),
-        ("command_ms", "stop written to the driver process"),
+        ("command_ms", "stop sent"),
         ("slower_ms", "arm decelerating, as measured"),
         ("standstill_ms", "standstill, as measured"),
         ("latched_ms", "latched: standstill after the reaction"),
@@ -185,6 +183,9 @@ _JOINT_SPEED = 1.0  # rad/s, of the leading joint
 _JOINT_ACCELERATION = 2.0  # rad/s2, of the leading joint
 _TOUCH_DELAY = 0.9  # s after the start of the second move: in the middle of it, at full speed
 _EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
+_MOVE_TIME = 10.0  # s, in which the arm would have arrived
+_CHECK_PERIOD = 0.02  # s
+_PRIMARY_PORT = 30001  # takes URScript
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -205,8 +206,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
     from coneskin.robot.sim.process import free_host
+    from coneskin.robot.ur.ur_rtde import wheel_remedy
     from coneskin.runs.replay.run import read_run
     from coneskin.scene.reader import parse_scene
+    from coneskin.scene.required_packages import missing_packages
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
     try:
@@ -214,7 +217,11 @@ def run(args: argparse.Namespace) -> int:
     except OSError as exc:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = args.host or free_host()
-    scene = parse_scene(_SCENE_TEXT.format(host=host, reaction=args.reaction), "scene.toml", folder)
+    for control in ("internal", "external"):
+        text = _SCENE_TEXT.format(host=host, control=control, reaction=args.reaction)
+        scene = parse_scene(text, "scene.toml", folder)
+        if not missing_packages(scene)[0]:
+            break
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
 
     def say(line: str) -> None:
@@ -222,6 +229,8 @@ def run(args: argparse.Namespace) -> int:
             print_line(line)
 
     say("coneskin demo: a simulated UR5e with a virtual skin on its forearm. Not a safety-rated device.")
+    if control == "external":
+        say(f"a URScript program moves the arm, because ur-rtde is not installed: {wheel_remedy()}")
     if scene.moves_away:
         _commission(scene, say)
     try:
@@ -315,7 +324,7 @@ def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> 
         transcript.line("the arm moves", after="activated")
         timer.start()
         try:
-            session.arm.move_j([math.radians(q) for q in _TO_DEG], _JOINT_SPEED, _JOINT_ACCELERATION)
+            _move(session, [math.radians(q) for q in _TO_DEG])
             print("coneskin demo: the arm arrived although it was touched", file=sys.stderr)
         except Collision as exc:
             transcript.line(f"the program gets Collision: {exc}", after="latched")
@@ -324,6 +333,25 @@ def _touch_by_script(scene: Scene, folder: Path, say: Callable[[str], None]) -> 
     if not touches:
         raise RobotRefused("the virtual skin was not touched: its process did not answer")
     return touches[0]
+
+
+def _move(session: Session, q: list[float]) -> None:
+    """Move the arm to joint positions [rad], by the wheel or, with external control, by a program on the controller.
+
+    Raises:
+        Collision: the skin was touched, and the arm has reacted.
+    """
+    arm = session.scene.arm
+    assert arm is not None
+    if arm.control == "internal":
+        session.arm.move_j(q, _JOINT_SPEED, _JOINT_ACCELERATION)
+        return
+    with socket.create_connection((arm.host, _PRIMARY_PORT), _EVENT_TIMEOUT) as controller:
+        controller.sendall(f"def demo():\n  movej({q}, a={_JOINT_ACCELERATION}, v={_JOINT_SPEED})\nend\n".encode())
+        end = time.monotonic() + _MOVE_TIME
+        while time.monotonic() < end:
+            session.check()
+            time.sleep(_CHECK_PERIOD)
 
 
 def _draw(recorded: Run, folder: Path, say: Callable[[str], None]) -> str | None:

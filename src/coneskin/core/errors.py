@@ -85,13 +85,13 @@ class MissingExtra(ConeSkinError, ImportError):
         package: the package that is missing.
     """
 
-    def __init__(self, package: str, job: str, extra: str | None = None) -> None:
+    def __init__(self, package: str, job: str, extra: str | None = None, remedy: str = "") -> None:
         self.package = package
         target = f"'coneskin[{extra}]'" if extra else package
-        super().__init__(f"{job} needs the package {package}: pip install {target}")
-        self._made_of = (package, job, extra)
+        super().__init__(f"{job} needs the package {package}: {remedy or f'pip install {target}'}")
+        self._made_of = (package, job, extra, remedy)
 
-    def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str, str | None]]:
+    def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str, str | None, str]]:
         return type(self), self._made_of
 
 

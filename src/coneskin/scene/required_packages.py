@@ -5,12 +5,14 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from coneskin.core.errors import MissingExtra
+from coneskin.robot.ur.ur_rtde import wheel_remedy
 from coneskin.skin.sources.kinds import is_simulated
 
 if TYPE_CHECKING:
     from .values.scene import Scene
 
-__all__ = ["missing_packages", "required_packages"]
+__all__ = ["missing_packages", "require_packages", "required_packages"]
 
 
 def required_packages(scene: Scene) -> dict[str, str]:
@@ -27,6 +29,21 @@ def required_packages(scene: Scene) -> dict[str, str]:
     return needed
 
 
-def missing_packages(scene: Scene) -> list[str]:
-    """Return those that are not installed, all together."""
-    return [package for module, package in required_packages(scene).items() if find_spec(module) is None]
+def missing_packages(scene: Scene) -> tuple[list[str], str]:
+    """Return those that are not installed, all together, and how to get them; twice nothing where all are there."""
+    missing = [package for module, package in required_packages(scene).items() if find_spec(module) is None]
+    remedy = f"pip install {' '.join(missing)}" if missing else ""
+    if "ur-rtde" in missing and not (wheel := wheel_remedy()).startswith("pip"):
+        others = [package for package in missing if package != "ur-rtde"]
+        remedy = "; ".join([*([f"pip install {' '.join(others)}"] if others else []), f"ur-rtde: {wheel}"])
+    return missing, remedy
+
+
+def require_packages(scene: Scene) -> None:
+    """Refuse a scene whose arm nothing here can move, before anything starts.
+
+    Raises:
+        MissingExtra: control is internal, and ur-rtde is not installed.
+    """
+    if required_packages(scene).get("rtde_control") and find_spec("rtde_control") is None:
+        raise MissingExtra("ur-rtde", "moving a UR arm from your program", remedy=wheel_remedy())

@@ -42,8 +42,9 @@ _SCHEMES = ("socket", "rfc2217", "loop", "hwgrep", "spy", "alt", "cp2110")  # of
 def suspicions(scene: Scene) -> list[Finding]:
     """Return what is hardly meant in a scene, all of it warnings: of the item "scene", and of "packages"."""
     found = [Finding("scene", "warning", line) for line in (*_units(scene), *_placing(scene), *_line(scene))]
-    if missing := missing_packages(scene):
-        value, remedy = f"{len(missing)} packages that it needs are not installed", f"pip install {' '.join(missing)}"
+    missing, remedy = missing_packages(scene)
+    if missing:
+        value = f"{len(missing)} packages that it needs are not installed"
         found.append(Finding("packages", "warning", value, "", remedy))
     return found
 

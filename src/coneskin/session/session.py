@@ -22,6 +22,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, stopping_contact
 from coneskin.scene.commissioning_record import with_commissioning
 from coneskin.scene.reader import load_scene
+from coneskin.scene.required_packages import require_packages
 from coneskin.scene.settings import resolved_settings
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.values.scene import Scene
@@ -93,6 +94,7 @@ class Session:
     ) -> None:
         if missing := missing_parts(scene):
             raise SceneError(missing, scene.name)
+        require_packages(scene)
         self.scene = with_commissioning(scene, time.time())
         self.recording = recording
         self._made = False  # the recording's folder

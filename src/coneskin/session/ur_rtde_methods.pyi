@@ -1,4 +1,4 @@
-"""Methods of ur_rtde on ``session.arm``, for type checkers and editors. Made by scripts/reference.py."""
+"""Methods of ur_rtde on ``session.arm``, for type checkers. Made by scripts/reference.py."""
 
 from collections.abc import Sequence
 from datetime import timedelta

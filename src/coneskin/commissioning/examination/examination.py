@@ -189,9 +189,9 @@ class Doctor:
 
 def _packages(scene: Scene) -> Iterator[Finding]:
     """Name all packages together that the scene needs and that are not installed."""
-    missing = missing_packages(scene)
+    missing, remedy = missing_packages(scene)
     if missing:
-        yield Finding("packages", "bad", f"{', '.join(missing)} missing", "", f"pip install {' '.join(missing)}")
+        yield Finding("packages", "bad", f"{', '.join(missing)} missing", "", remedy)
     else:
         yield Finding("packages", "ok", ", ".join(required_packages(scene).values()) or "none needed")
 
