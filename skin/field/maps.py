@@ -104,8 +104,9 @@ class FieldMap:
         sheet, model = self.model.sheet, self.model
         u, phi = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(phi, dtype=np.float64))
         h = 1e-5 * min(sheet.length, sheet.breadth)
-        x = np.clip(sheet.along(u)[0], h, sheet.length - h)
-        y = np.clip(sheet.across(phi)[0], h, sheet.breadth - h)
+        edge = 1.000001 * h  # so that no rounding takes a point off the sheet
+        x = np.clip(sheet.along(u)[0], edge, sheet.length - edge)
+        y = np.clip(sheet.across(phi)[0], edge, sheet.breadth - edge)
         east, west = self.potentials(*sheet.locate(x + h, y)), self.potentials(*sheet.locate(x - h, y))
         north, south = self.potentials(*sheet.locate(x, y + h)), self.potentials(*sheet.locate(x, y - h))
         out = []

@@ -64,7 +64,7 @@ def _outline(axes: Any, sheet: SectorSheet, names: dict[str, str]) -> None:
             middle_phi = sheet.wrap * 0.5 * (1.0 + inside[0])
             near = np.array([0.0, 1e-3])  # on the edge, and a little inside of it
             x, y = _plane(sheet, middle_u - inside[1] * near * sheet.width, middle_phi - inside[0] * near * sheet.wrap)
-            gap = 0.05 * sheet.width * 1e3 / math.hypot(x[1] - x[0], y[1] - y[0])
+            gap = 0.09 * sheet.width * 1e3 / math.hypot(x[1] - x[0], y[1] - y[0])
             at = float(x[0] + gap * (x[0] - x[1])), float(y[0] + gap * (y[0] - y[1]))
             axes.text(*at, names[name], ha="center", va="center", fontsize=9)
     axes.set_aspect("equal")
@@ -101,8 +101,9 @@ def draw_potential(
     x, y = _plane(sheet, u, phi)
     figure, (axes,) = make_figure(5.6, 4.9)
     if filled:
-        picture = axes.contourf(x, y, volts, 40, cmap="viridis")
-        figure.colorbar(picture, ax=axes, label="potential [V]", shrink=0.85)
+        picture = axes.contourf(x, y, volts, np.linspace(volts.min(), volts.max(), 41), cmap="viridis")
+        ticks = np.linspace(volts.min(), volts.max(), 6).round(9) + 0.0
+        figure.colorbar(picture, ax=axes, label="potential [V]", shrink=0.85, ticks=ticks, format="%.3g")
     lines = axes.contour(x, y, volts, 11, colors="white" if filled else "tab:blue", linewidths=0.9)
     axes.clabel(lines, fontsize=7, fmt="%.2g")
     _field_lines(axes, field, upper)

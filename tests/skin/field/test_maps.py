@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import FieldError
+from coneskin.geometry.frustum import Frustum
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.maps import FieldMap
 from coneskin.skin.field.model import FieldModel
+from coneskin.skin.field.sheet import SectorSheet
 from tests.support.field.contact_patch import rectangle_offsets
 
 from ..field_cases import PAPER, SHEETS
@@ -75,6 +77,14 @@ def test_without_contact_the_field_is_the_papers() -> None:
     assert np.allclose(upper, 2.0 * np.log(r / 0.2) / math.log(0.5), atol=1e-14)
     _, lower = FieldMap.of(model, [], angular_phase(2.0, adc=1e9)).potentials(0.03, phi)
     assert np.allclose(lower, 2.0 * theta / (math.pi / 2), atol=1e-14)
+
+
+def test_the_current_has_a_value_at_every_edge() -> None:
+    """Differences reach to the edge, where one rounding would lie off the sheet, as it did on this one."""
+    sheet = SectorSheet.of_frustum(Frustum(0.04, 0.07, 0.15, math.radians(300.0)))
+    field = FieldMap.of(FieldModel(sheet, 1e3, 1e3), (), radial_phase(2.5, 1e9))
+    u, phi = np.meshgrid(np.linspace(0.0, sheet.width, 161), np.linspace(0.0, sheet.wrap, 13))
+    assert np.isfinite(field.currents(u, phi)).all()
 
 
 def test_points_off_the_sheet_are_refused() -> None:
