@@ -51,8 +51,9 @@ def test_the_module_of_each_command_is_there(command: str) -> None:
 
 def parsers(command: str) -> dict[str, argparse.ArgumentParser]:
     """Return the parser of a command and those of its jobs, by their names."""
-    parser = argparse.ArgumentParser(prog=f"coneskin {command}")
-    importlib.import_module(COMMANDS[command][0]).add_arguments(parser)
+    module = importlib.import_module(COMMANDS[command][0])
+    parser = argparse.ArgumentParser(prog=f"coneskin {command}", epilog=str(module.__doc__).partition("\n\n")[2])
+    module.add_arguments(parser)
     jobs = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     inner = {f"{command} {name}": made for action in jobs for name, made in action.choices.items()}
     return {command: parser, **inner}

@@ -126,6 +126,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         )
         if name == chosen:
             module = importlib.import_module(module_name)
+            child.epilog = (module.__doc__ or "").partition("\n\n")[2]  # what is below a module's first line
             module.add_arguments(child)
             run = module.run
     if completing is not None:

@@ -1,22 +1,5 @@
-"""``coneskin calibrate``: known places of a skin are touched, and what it reads wrongly is taken off from then on."""
+"""``coneskin calibrate``: known places of a skin are touched, and what it reads wrongly is taken off from then on.
 
-from __future__ import annotations
-
-import argparse
-import json
-import tomllib
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from .terminal import LiveReading, Person
-
-if TYPE_CHECKING:
-    from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
-    from coneskin.scene.values.scene import Scene
-
-__all__ = ["add_arguments", "run"]
-
-_EXAMPLE = """\
 example:
   coneskin calibrate scene.toml --by "A. Person"     touch each mark as it is named; "n" and Enter: out of reach
   coneskin calibrate scene.toml --list
@@ -27,6 +10,25 @@ nothing here moves it. The result is added to calibrations/device-<device>.json 
 names as its calibration; it applies once the sensor's table has `calibration = "calibrations"`. A commissioning made
 with another calibration is void. Exit code: 0 all sensors are calibrated, 1 not all, or not carried out.
 """
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.core.errors import SceneError
+
+from .terminal import LiveReading, Person
+
+if TYPE_CHECKING:
+    from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
+    from coneskin.scene.values.scene import Scene
+
+__all__ = ["add_arguments", "run"]
+
 _DEFAULT_FOLDER = "calibrations"
 #: of a calibration, in the JSON object of its result
 _SHOWN_FIELDS = (
@@ -34,30 +36,19 @@ _SHOWN_FIELDS = (
     *("map_along", "map_around", "fitted_along", "fitted_around", "extra_ohm", "sheet_ohm"),
     *("forces_n", "force_levels", "force_error"),
 )
+_ERROR_HELP = "standard deviation with which marks are placed and touched, along and around (default: 0.3)"
+_FORCES_HELP = "then press three of the marks with these known forces [N], e.g. 1,2,5,10, for touch_force_n"
 _MARKS_HELP = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     add("--by", default="", metavar="NAME", help="who touches; goes into the record")
     add("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS_HELP)
-    add(
-        "--mark-error-mm",
-        type=_mark_error,
-        default=0.3,
-        metavar="MM",
-        help="standard deviation with which marks are placed and touched, along and around (default: 0.3)",
-    )
-    add(
-        "--forces",
-        type=_forces,
-        default=(),
-        metavar="N,N,...",
-        help="then press three of the marks with these known forces [N], e.g. 1,2,5,10, for touch_force_n",
-    )
+    add("--mark-error-mm", type=_mark_error, default=0.3, metavar="MM", help=_ERROR_HELP)
+    add("--forces", type=_forces, default=(), metavar="N,N,...", help=_FORCES_HELP)
     add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
     add("--skin", type=Path, metavar="SCENE", help="with --simulated: scene that says how the virtual skin was built")
     add("--picture", type=Path, metavar="FILE", help="draw the residuals (png, svg, pdf)")
@@ -81,8 +72,6 @@ def _forces(text: str) -> tuple[float, ...]:
 
 def _check_names(scene: Scene, built: Scene) -> None:
     """Refuse a virtual skin whose sensors are not those that are touched."""
-    from coneskin.core.errors import SceneError
-
     names, others = ({placed.sensor.name for placed in each.sensors} for each in (scene, built))
     if names != others:
         said = f"{', '.join(sorted(names))}, got {', '.join(sorted(others)) or 'none'}"
@@ -93,7 +82,6 @@ def run(args: argparse.Namespace) -> int:
     """Calibrate the skin of a scene, or list its marks."""
     from coneskin.commissioning.calibration.calibrate import Calibrator
     from coneskin.commissioning.skin_watch import TouchSession, check_touchable
-    from coneskin.core.errors import SceneError
     from coneskin.scene.reader import load_scene
     from coneskin.scene.tables.sensor_tables import named_files
     from coneskin.skin.sources.kinds import is_simulated

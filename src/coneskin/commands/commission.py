@@ -1,4 +1,14 @@
-"""``coneskin commission``: a person touches marks on a skin, and the skin must read them where they are."""
+"""``coneskin commission``: a person touches marks on a skin, and the skin must read them where they are.
+
+example:
+  coneskin commission scene.toml --by "A. Person"    touch each mark as it is named; "n" and Enter: out of reach
+  coneskin commission scene.toml --list --picture marks.png
+  coneskin commission scene.toml --simulated         a virtual skin, which is touched by the command itself
+
+The arm stands: nothing here moves it, and nothing guards it either. The result is written beside the scene, as
+scene.commissioning.json. Without one that has passed, `coneskin guard` only stops the arm where the scene lets it
+retreat or comply. Ctrl-C writes nothing. Exit code: 0 passed, 1 not passed, or not carried out.
+"""
 
 from __future__ import annotations
 
@@ -17,31 +27,15 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin commission scene.toml --by "A. Person"    touch each mark as it is named; "n" and Enter: out of reach
-  coneskin commission scene.toml --list --picture marks.png
-  coneskin commission scene.toml --simulated         a virtual skin, which is touched by the command itself
-
-The arm stands: nothing here moves it, and nothing guards it either. The result is written beside the scene, as
-scene.commissioning.json. Without one that has passed, `coneskin guard` only stops the arm where the scene lets it
-retreat or comply. Ctrl-C writes nothing. Exit code: 0 passed, 1 not passed, or not carried out.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     add("--by", default="", metavar="NAME", help="who touches; goes into the record")
     add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
-    add(
-        "--posture-deg",
-        type=_posture,
-        metavar="Q1,...,Q6",
-        help="joint positions [deg] for which the marks are described; by default the controller is asked",
-    )
+    help_text = "joint positions [deg] for which the marks are described (default: the controller is asked)"
+    add("--posture-deg", type=_posture, metavar="Q1,...,Q6", help=help_text)
     add("--picture", type=Path, metavar="FILE", help="draw the marks (png, svg, pdf)")
     add("--list", action="store_true", help="list the marks, and touch nothing")
     add("--json", action="store_true", help="print JSON objects, one per line")

@@ -3,6 +3,12 @@
 A script touches the skin. Everything else is the real thing: bytes through a pseudo-terminal and pyserial, the guard in
 its own process, the unmodified ur_rtde wheel against a controller in another process, a recording, and its replay. On a
 computer for which there is no such wheel, a URScript program moves the arm.
+
+example:
+  coneskin demo                          about 15 s; writes runs/demo-.../
+  coneskin demo --reaction stop --json
+
+exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
 """
 
 from __future__ import annotations
@@ -171,14 +177,6 @@ def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     print_hint(f"next: coneskin replay {shlex.quote(str(folder))} --events")
 
 
-_EXAMPLE = """\
-example:
-  coneskin demo                          about 15 s; writes runs/demo-.../
-  coneskin demo --reaction stop --json
-
-exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
-"""
-
 _JOINT_SPEED = 1.0  # rad/s, of the leading joint
 _JOINT_ACCELERATION = 2.0  # rad/s2, of the leading joint
 _TOUCH_DELAY = 0.9  # s after the start of the second move: in the middle of it, at full speed
@@ -191,15 +189,8 @@ _PRIMARY_PORT = 30001  # takes URScript
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("-o", "--output", type=Path, metavar="DIR", help="folder for the run (default runs/demo-TIME)")
-    add(
-        "--reaction",
-        choices=("stop", "retreat"),
-        default="retreat",
-        help="what the arm does when it is touched (default retreat)",
-    )
-    add("--host", help="loopback address for the simulated controller (default: a free one)")
+    add("--reaction", choices=("stop", "retreat"), default="retreat", help="to a touch (default retreat)")
     add("--json", action="store_true", help="print one JSON object at the end")
 
 
@@ -216,7 +207,7 @@ def run(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True)
     except OSError as exc:
         raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
-    host = args.host or free_host()
+    host = free_host()
     for control in ("internal", "external"):
         text = _SCENE_TEXT.format(host=host, control=control, reaction=args.reaction)
         scene = parse_scene(text, "scene.toml", folder)

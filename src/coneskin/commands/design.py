@@ -1,4 +1,20 @@
-"""Command ``coneskin design``: sheets for a link, ready to be cut, and the sensor file for the guard."""
+"""Command ``coneskin design``: sheets for a link, ready to be cut, and the sensor file for the guard.
+
+examples:
+  coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
+  coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
+  coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
+  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
+  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
+                                                                                            a rugby ball: two sheets
+  coneskin design --write-options design.toml          layers, electrodes, wires, drawings, jig, electronics: all keys
+  coneskin design upperarm.stl -o skin --options design.toml
+  coneskin design upperarm.stl -o skin --set drawings.kerf_mm=0.2 --set sheet.wires=end2
+
+The folder then holds report.md, sensor.toml, materials.csv, design.json, and cut/ with a DXF, SVG and PDF file for
+every layer. If the command fails, no folder is left. Exit code: 0 written; 3 no cone fits the mesh; 1 another failure;
+2 wrong usage.
+"""
 
 from __future__ import annotations
 
@@ -28,35 +44,17 @@ from coneskin.skin.electronics import shunt_ohms
 from .dimensions import add_key_options, given_keys, option_name
 from .terminal import ending_signals, print_hint
 
-__all__ = ["EXAMPLES", "add_arguments", "run"]
+__all__ = ["add_arguments", "run"]
 
 _NO_FIT_EXIT_CODE = 3
 _LEAST_BRIDGED_SHARE = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
 #: keys of design.toml that have an option of their own
 _SHORT_KEYS = tuple(key for key in DESIGN_TABLES["search"][1] if key.name in ("tolerance_mm", "max_sheets"))
 
-EXAMPLES = """\
-examples:
-  coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
-  coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
-  coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
-  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
-  coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
-                                                                                            a rugby ball: two sheets
-  coneskin design --write-options design.toml          layers, electrodes, wires, drawings, jig, electronics: all keys
-  coneskin design upperarm.stl -o skin --options design.toml
-  coneskin design upperarm.stl -o skin --set drawings.kerf_mm=0.2 --set sheet.wires=end2
-
-The folder then holds report.md, sensor.toml, materials.csv, design.json, and cut/ with a DXF, SVG and PDF file for
-every layer. If the command fails, no folder is left. Exit code: 0 written; 3 no cone fits the mesh; 1 another failure;
-2 wrong usage.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.usage = "coneskin design [LINK] -o DIR [options]"
-    parser.epilog = EXAMPLES
     add = parser.add_argument
     add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
     add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create")
@@ -64,44 +62,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--json", action="store_true", help="print the design as JSON")
     add("--no-pictures", action="store_true", help="write the report without pictures")
     add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")
-    add(
-        "--write-options",
-        action=_WriteOptions,
-        metavar="FILE",
-        help="write such a file with every key, its default, unit and meaning, and end",
-    )
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="TABLE.KEY=VALUE",
-        help="one key of such a file; may be repeated, and goes before the file",
-    )
+    add("--write-options", action=_WriteOptions, metavar="FILE", help="write such a file with all its keys, and end")
+    many: dict[str, Any] = {"action": "append", "default": []}
+    add("--set", metavar="TABLE.KEY=VALUE", help="one key of such a file, before the file; may be repeated", **many)
 
     add = parser.add_argument_group("finding sheets in a mesh").add_argument
     add("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed and reported)")
     add_key_options(add, _SHORT_KEYS, defaults={"tolerance": "1", "max_sheets": "2"})
-    add(
-        "--seam",
-        type=float,
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="direction in which the seam faces, as the cable (default: where the link shields it most)",
-    )
-    add(
-        "--package",
-        action="append",
-        default=[],
-        metavar="NAME=DIR",
-        help="folder of a ROS package that a URDF names (package://NAME/...); may be repeated",
-    )
-    add(
-        "--xacro-arg",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="argument of a xacro file, which is expanded (extra xacro); may be repeated",
-    )
+    seam_help = "direction in which the seam faces, as the cable (default: where the link shields it most)"
+    add("--seam", type=float, nargs=3, metavar=("X", "Y", "Z"), help=seam_help)
+    package_help = "folder of a ROS package that a URDF names (package://NAME/...); may be repeated"
+    add("--package", metavar="NAME=DIR", help=package_help, **many)
+    add("--xacro-arg", metavar="NAME=VALUE", help="argument of a xacro file (extra xacro); may be repeated", **many)
 
     add = parser.add_argument_group("a link by its dimensions").add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360, or the widest that fits the mesh"}

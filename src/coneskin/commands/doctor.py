@@ -1,4 +1,17 @@
-"""``coneskin doctor``: examine the skin, the wires and the arm of a scene; each finding comes with its remedy."""
+"""``coneskin doctor``: examine the skin, the wires and the arm of a scene; each finding comes with its remedy.
+
+example:
+  coneskin doctor scene.toml                 the skin untouched, then touched near A, B, C and D; then the arm
+  coneskin doctor scene.toml --check         read the scene, list what is in it, open and start nothing
+  coneskin doctor scene.toml --no-touches    nobody touches: what untouched frames and the controller say
+  coneskin doctor scene.toml --simulated     a virtual skin is touched by the command, the arm is simulated
+
+Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
+mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
+something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes or
+lacks something. Without a valid commissioning record a guard can start, so that is 0 as well. The arm then only stops,
+and the last line says so.
+"""
 
 from __future__ import annotations
 
@@ -24,26 +37,12 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin doctor scene.toml                 the skin untouched, then touched near A, B, C and D; then the arm
-  coneskin doctor scene.toml --check         read the scene, list what is in it, open and start nothing
-  coneskin doctor scene.toml --no-touches    nobody touches: what untouched frames and the controller say
-  coneskin doctor scene.toml --simulated     a virtual skin is touched by the command, the arm is simulated
-
-Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
-mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
-something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes or
-lacks something. Without a valid commissioning record a guard can start, so that is 0 as well. The arm then only stops,
-and the last line says so.
-"""
 _VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     add("--check", action="store_true", help="list what is in the scene; open and start nothing")
     add("--simulated", action="store_true", help="start a simulated controller at the scene's host")

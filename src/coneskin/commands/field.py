@@ -1,4 +1,14 @@
-"""Command ``coneskin field``: the electric field of a sensor, as pictures, and how far a large contact is misread."""
+"""Command ``coneskin field``: the electric field of a sensor, as pictures, and how far a large contact is misread.
+
+example:
+  coneskin field --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 300 -o field
+  Draw the potential of both sheets while a contact presses on the middle, and two error maps: decoded minus true place
+  of a contact, all over the sensor. Print the resistances of the sheets and the largest errors.
+
+A contact is a round perfect bond. Its place is decoded from the mean of the two guides, as in the paper (eq. 20, 24):
+the live decode takes the area's influence off. The paper's own figures and tables: python demos/paper/paper_figures.py
+Exit code: 0; 1 there is no such sensor, a file cannot be written, or a package is not installed; 2 wrong usage.
+"""
 
 from __future__ import annotations
 
@@ -19,16 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin field --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 300 -o field
-  Draw the potential of both sheets while a contact presses on the middle, and two error maps: decoded minus true place
-  of a contact, all over the sensor. Print the resistances of the sheets and the largest errors.
-
-A contact is a round perfect bond. Its place is decoded from the mean of the two guides, as in the paper (eq. 20, 24):
-the live decode takes the area's influence off. The paper's own figures and tables: python demos/paper/paper_figures.py
-Exit code: 0; 1 there is no such sensor, a file cannot be written, or a package is not installed; 2 wrong usage.
-"""
 _ADC_OHMS = 1e9  # an input of the converter, which fixes a guide
 _PICTURES = ("potential_radial", "potential_angular", "error_u", "error_phi")
 
@@ -36,7 +36,6 @@ _PICTURES = ("potential_radial", "potential_angular", "error_u", "error_phi")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = "Solve the field of your sensor exactly: potential maps, error maps, resistances."
-    parser.epilog = _EXAMPLE
     add = parser.add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
     add_key_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)

@@ -1,4 +1,12 @@
-"""``coneskin find-port``: find the port of a device by unplugging it and plugging it in again."""
+"""``coneskin find-port``: find the port of a device by unplugging it and plugging it in again.
+
+example:
+  coneskin find-port                 unplug the device when told to, and plug it in again
+  coneskin find-port --list          the ports that are there, and what stands against their use
+
+The last line of the output is the port, under a name that stays where the system has one: write it into the scene, or
+give it to `coneskin monitor`. Exit code: 0 found and permitted, 1 not.
+"""
 
 from __future__ import annotations
 
@@ -19,20 +27,10 @@ __all__ = ["add_arguments", "run"]
 
 _POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
-_EXAMPLE = """\
-example:
-  coneskin find-port                 unplug the device when told to, and plug it in again
-  coneskin find-port --list          the ports that are there, and what stands against their use
-
-The last line of the output is the port, under a name that stays where the system has one: write it into the scene, or
-give it to `coneskin monitor`. Exit code: 0 found and permitted, 1 not.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("--list", action="store_true", help="list the ports that are there, and end")
     add("--timeout-s", type=positive_seconds, default=60.0, help="give up after this time (default 60)")
     add("--json", action="store_true", help="print the result as a JSON object")

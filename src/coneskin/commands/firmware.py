@@ -1,15 +1,5 @@
-"""Command ``coneskin firmware``: the sketch of a board, its wiring and its parts, for a sensor."""
+"""Command ``coneskin firmware``: the sketch of a board, its wiring and its parts, for a sensor.
 
-from __future__ import annotations
-
-import argparse
-from pathlib import Path
-
-from coneskin.core.errors import GeometryError, SceneError
-
-__all__ = ["add_arguments", "run"]
-
-_EXAMPLE = """\
 example:
   coneskin firmware out/sensor.toml --to board              for an Arduino Uno
   coneskin firmware out/sensor.toml --board pico --to board
@@ -21,21 +11,25 @@ Files that are there already and are others, such as a sketch of your own, are n
 Exit code: 0 written, 1 not written.
 """
 
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from coneskin.core.errors import GeometryError, SceneError
+
+__all__ = ["add_arguments", "run"]
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     from coneskin.skin.firmware.boards import BUILT_IN, boards, converters
 
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("sensor", type=Path, metavar="SENSOR", help="sensor.toml, as coneskin design writes it")
     add("--board", choices=list(boards()), default="uno", help="which board (default: %(default)s)")
-    add(
-        "--converter",
-        choices=[BUILT_IN, *converters()],
-        default=BUILT_IN,
-        help="the board's own, or two ADS1x15 on its I2C pins (default: %(default)s)",
-    )
+    help_text = "the board's own, or two ADS1x15 on its I2C pins (default: %(default)s)"
+    add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help=help_text)
     add("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
     add("--force", action="store_true", help="replace files that are there already and are others")
 

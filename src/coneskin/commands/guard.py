@@ -1,4 +1,14 @@
-"""``coneskin guard``: guard the arm of a scene, and move it if the scene says how."""
+"""``coneskin guard``: guard the arm of a scene, and move it if the scene says how.
+
+example:
+  coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
+  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
+                                         where the scene has bodies, the arm runs into them (extra physics)
+
+Keys of a scene: docs/look-up/scene.md. Exit code: 0 nothing happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
+SIGTERM do not change it. `coneskin doctor scene.toml --check` tells whether a guard can start with a scene.
+coneskin is not a safety-rated device; read docs/safety.md before you use it.
+"""
 
 from __future__ import annotations
 
@@ -33,43 +43,17 @@ __all__ = ["add_arguments", "run"]
 _START_TIMEOUT = 20.0  # s for the guard to become active
 _LINE_PAUSE = 0.3  # s without a line after which all earlier ones have been read
 
-_EXAMPLE = """\
-example:
-  coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
-  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
-                                         where the scene has bodies, the arm runs into them (extra physics)
-
-Keys of a scene: docs/look-up/scene.md. Exit code: 0 nothing happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
-SIGTERM do not change it. `coneskin doctor scene.toml --check` tells whether a guard can start with a scene.
-coneskin is not a safety-rated device; read docs/safety.md before you use it.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    add(
-        "--simulated",
-        action="store_true",
-        help="start a simulated controller at the scene's host, on this computer; its arm meets the scene's bodies",
-    )
-    add(
-        "--publish",
-        metavar="URL",
-        action="append",
-        default=[],
-        help="send each event as JSON to udp://127.0.0.1:PORT; may be repeated",
-    )
+    add("--simulated", action="store_true", help="simulate the controller at the scene's host, and the scene's bodies")
+    publish_help = "send each event as JSON to udp://127.0.0.1:PORT; may be repeated"
+    add("--publish", metavar="URL", action="append", default=[], help=publish_help)
     add("--publish-beyond", action="store_true", help="allow an address of another computer")
     add("--once", action="store_true", help="end after the first collision or fault")
-    add(
-        "--duration-s",
-        type=positive_seconds,
-        metavar="S",
-        help="end after this time [s], once the move under way is over",
-    )
+    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s] and the move under way")
     add("--json", action="store_true", help="print each event as a JSON object, one per line")
 
 

@@ -1,4 +1,12 @@
-"""``coneskin heartbeat``: the lines with which an external program depends on its guard, network or not."""
+"""``coneskin heartbeat``: the lines with which an external program depends on its guard, network or not.
+
+example:
+  coneskin heartbeat scene.toml          put what it prints at the beginning of the program on the controller
+
+The lines are URScript. In PolyScope they go into a script node before the first move; how a program with ur_rtde gets
+them: docs/do/guard-external.md. The scene's arm.controller_heartbeat = "required" stops a program without them.
+Exit code: 0; 1 the scene has mistakes, or control = internal.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +18,9 @@ from coneskin.core.errors import RobotRefused
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin heartbeat scene.toml          put what it prints at the beginning of the program on the controller
-
-The lines are URScript. In PolyScope they go into a script node before the first move; how a program with ur_rtde gets
-them: docs/do/guard-external.md. The scene's arm.controller_heartbeat = "required" stops a program without them.
-Exit code: 0; 1 the scene has mistakes, or control = internal.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.epilog = _EXAMPLE
     parser.add_argument("scene", type=Path, metavar="SCENE", help="scene file, TOML, with control = external")
 
 

@@ -2,6 +2,14 @@
 
 The same collision with each way to protect the body: the scene's guard, the guard with each reaction, the controller's
 own force limit imitated, and nothing. In virtual time; nothing that moves is real.
+
+example:
+  coneskin impact scene.toml
+  coneskin impact scene.toml --ways "guard,stop,nothing" --json
+
+The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/do/impact.md).
+
+exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise.
 """
 
 from __future__ import annotations
@@ -22,37 +30,21 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin impact scene.toml
-  coneskin impact scene.toml --ways "guard,stop,nothing" --json
-
-The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/do/impact.md).
-
-exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise."""
 _REACTION_NAMES = ("stop", "retreat", "comply", "slow")
 _NO_GUARD = ("force limit", "nothing")
 _STOP_WAYS = ("guard", *_REACTION_NAMES, *_NO_GUARD)
 _COLUMN_NAMES = (
-    ("peak", 1.0, "N"),
-    ("clamp", 1.0, "N"),
-    ("impulse", 1.0, "Ns"),
-    ("depth", 1e3, "mm"),
-    ("noticed", 1e3, "ms"),
-    ("standstill", 1e3, "ms"),
+    *(("peak", 1.0, "N"), ("clamp", 1.0, "N"), ("impulse", 1.0, "Ns")),
+    *(("depth", 1e3, "mm"), ("noticed", 1e3, "ms"), ("standstill", 1e3, "ms")),
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, help="scene file")
-    add(
-        "--ways",
-        default=",".join(_STOP_WAYS),
-        help="what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)",
-    )
+    help_text = "what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)"
+    add("--ways", default=",".join(_STOP_WAYS), help=help_text)
     add("--seed", type=int, default=0, help="of the skins' noise (default 0)")
     add("--longest-s", type=float, default=20.0, metavar="T", help="for which to look on (default 20)")
     add("--json", action="store_true", help="print one JSON object")

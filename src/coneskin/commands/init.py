@@ -1,4 +1,14 @@
-"""``coneskin init``: write the scene for a design, so that nobody has to write one by hand."""
+"""``coneskin init``: write the scene for a design, so that nobody has to write one by hand.
+
+example:
+  coneskin init skin --simulated                                         a simulated UR5e and a virtual skin
+  coneskin init skin --arm UR10e --host 192.168.0.10 --port /dev/ttyUSB0
+  coneskin init skin --skin-only --port /dev/ttyUSB0                     no arm: touches are reported
+  coneskin init skin --arm UR5e --host 192.168.0.10 --port /dev/ttyACM0 --board uno     with the board's own values
+
+The scene names the sensors of the design, their link, poses and electronics; the arm stops when it is touched. An
+existing scene is not replaced without --force. Exit code: 0 written, 1 not written.
+"""
 
 from __future__ import annotations
 
@@ -19,22 +29,11 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin init skin --simulated                                         a simulated UR5e and a virtual skin
-  coneskin init skin --arm UR10e --host 192.168.0.10 --port /dev/ttyUSB0
-  coneskin init skin --skin-only --port /dev/ttyUSB0                     no arm: touches are reported
-  coneskin init skin --arm UR5e --host 192.168.0.10 --port /dev/ttyACM0 --board uno     with the board's own values
-
-The scene names the sensors of the design, their link, poses and electronics; the arm stops when it is touched. An
-existing scene is not replaced without --force. Exit code: 0 written, 1 not written.
-"""
 _SIMULATED_HOST = "127.0.0.1"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.epilog = _EXAMPLE
     from coneskin.skin.firmware.boards import BUILT_IN, boards, converters
 
     add = parser.add_argument
@@ -44,13 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--simulated", action="store_true", help="a simulated arm and a virtual skin, which is touched in the motion")
     add("--arm", metavar="MODEL", help=f"model of the arm, such as UR10e; with --simulated {DEFAULT_MODEL} by default")
     add("--host", metavar="ADDRESS", help=f"of the controller; with --simulated {_SIMULATED_HOST} by default")
-    add(
-        "--port",
-        metavar="PORT",
-        action="append",
-        default=[],
-        help="serial port of the skin, such as /dev/ttyUSB0; may be repeated",
-    )
+    help_text = "serial port of the skin, such as /dev/ttyUSB0; may be repeated"
+    add("--port", metavar="PORT", action="append", default=[], help=help_text)
     add("--board", choices=list(boards()), help="board of `coneskin firmware`: the scene says its values")
     add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help="of the board (default: %(default)s)")
     add("--link", metavar="NAME", help="link of the arm, such as forearm; by default as the design's mesh is named")

@@ -1,4 +1,14 @@
-"""``coneskin monitor``: what arrives on a line, and what is wrong with it; no arm and no scene are needed."""
+"""``coneskin monitor``: what arrives on a line, and what is wrong with it; no arm and no scene are needed.
+
+example:
+  coneskin monitor /dev/ttyUSB0            what the firmware sends, and the first mistake in it
+  coneskin monitor scene.toml --hex        beside what the scene expects, with the bytes
+  coneskin monitor runs/2026-01-31T12-00-00   what a recorded line said
+  coneskin monitor /dev/ttyUSB0 --duration-s 3 --json
+
+The first line is the diagnosis. On a terminal the screen is drawn over and over; into a pipe goes a line a second.
+Ctrl-C ends with a summary. Exit code: 0 the last diagnosis is good, 1 it is not.
+"""
 
 from __future__ import annotations
 
@@ -28,27 +38,12 @@ _READ_TIMEOUT = 0.05  # s
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 _CLEAR_SCREEN = "\x1b[2J"
 
-_EXAMPLE = """\
-example:
-  coneskin monitor /dev/ttyUSB0            what the firmware sends, and the first mistake in it
-  coneskin monitor scene.toml --hex        beside what the scene expects, with the bytes
-  coneskin monitor runs/2026-01-31T12-00-00   what a recorded line said
-  coneskin monitor /dev/ttyUSB0 --duration-s 3 --json
-
-The first line is the diagnosis. On a terminal the screen is drawn over and over; into a pipe goes a line a second.
-Ctrl-C ends with a summary. Exit code: 0 the last diagnosis is good, 1 it is not.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.epilog = _EXAMPLE
     add = parser.add_argument
-    add(
-        "target",
-        metavar="PORT|SCENE|FILE",
-        help="a port, a scene file (.toml), a run (its folder or .rec) or a file of bytes",
-    )
+    help_text = "a port, a scene file (.toml), a run (its folder or .rec) or a file of bytes"
+    add("target", metavar="PORT|SCENE|FILE", help=help_text)
     add("--baud", type=_baud, default=921600, help="of a port, in bits a second (default 921600)")
     add("--hex", action="store_true", help="show the bytes; those that have changed are highlighted")
     add("--duration-s", type=positive_seconds, default=math.inf, help="end after this time (default: never)")

@@ -1,4 +1,14 @@
-"""``coneskin permissible``: how fast which part of a skinned arm may move, by the limits of whoever uses it."""
+"""``coneskin permissible``: how fast which part of a skinned arm may move, by the limits of whoever uses it.
+
+example:
+  coneskin permissible scene.toml --limits limits.toml -o impact.toml --picture impact.png
+
+The scene needs an [arm], skins and their [padding]; with a [motion] the speeds are those of its joint positions. The
+limits are yours: docs/do/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
+lets the guard keep the speeds. A model with assumed servos; no safety assessment.
+
+exit code: 0; 1 where no speed keeps the limits, or a file has a mistake.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +30,10 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLE = """\
-example:
-  coneskin permissible scene.toml --limits limits.toml -o impact.toml --picture impact.png
-
-The scene needs an [arm], skins and their [padding]; with a [motion] the speeds are those of its joint positions. The
-limits are yours: docs/do/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
-lets the guard keep the speeds. A model with assumed servos; no safety assessment.
-
-exit code: 0; 1 where no speed keeps the limits, or a file has a mistake."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("scene", type=Path, help="scene file")
     add("--limits", type=Path, required=True, metavar="FILE", help="limits of the force, and how the arm stops")
     add("-o", "--output", type=Path, metavar="FILE", help="write the speeds as TOML for speed_limit_from")

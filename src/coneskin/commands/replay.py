@@ -1,4 +1,24 @@
-"""``coneskin replay``: run a recording again and compare."""
+"""``coneskin replay``: run a recording again and compare.
+
+examples:
+  coneskin replay runs/2026-01-31T12-00-00            compare: the same bytes through the same guard
+  coneskin replay runs/2026-01-31T12-00-00 --events --picture run.png
+  coneskin replay runs/                               which runs are there
+  coneskin replay runs/*                              all of them, side by side
+
+what if:
+  coneskin replay runs/a --set reaction.kind=stop --set detection.touch_level=0.08
+  coneskin replay runs/a --set reaction.rule.0.kind=slow --set sensor."forearm skin".touch_level=0.08
+  coneskin replay runs/a --scene other.toml           another scene
+  coneskin replay runs/* --vary detection.touch_level=0.06,0.08,0.12 --picture delay.png --table all.parquet
+
+Times count from the start of the run. Names of settings: docs/do/runs.md. Exit code:
+  0  the events are the same, bit by bit; with --scene, --set, --vary: it ran
+  1  an event differs, or a run cannot be read
+  2  wrong usage, or a folder that is no run
+  4  nothing differs, but the recording is incomplete or damaged, was not closed, or has no events;
+     with --allow-incomplete 0 instead
+"""
 
 from __future__ import annotations
 
@@ -20,41 +40,15 @@ __all__ = ["add_arguments", "run"]
 
 _EXIT_CODES = {"same": 0, "different": 1, "incomplete": 4}  # by verdict
 
-_EXAMPLE = """\
-examples:
-  coneskin replay runs/2026-01-31T12-00-00            compare: the same bytes through the same guard
-  coneskin replay runs/2026-01-31T12-00-00 --events --picture run.png
-  coneskin replay runs/                               which runs are there
-  coneskin replay runs/*                              all of them, side by side
-
-what if:
-  coneskin replay runs/a --set reaction.kind=stop --set detection.touch_level=0.08
-  coneskin replay runs/a --set reaction.rule.0.kind=slow --set sensor."forearm skin".touch_level=0.08
-  coneskin replay runs/a --scene other.toml           another scene
-  coneskin replay runs/* --vary detection.touch_level=0.06,0.08,0.12 --picture delay.png --table all.parquet
-
-Times count from the start of the run. Names of settings: docs/do/runs.md. Exit code:
-  0  the events are the same, bit by bit; with --scene, --set, --vary: it ran
-  1  an event differs, or a run cannot be read
-  2  wrong usage, or a folder that is no run
-  4  nothing differs, but the recording is incomplete or damaged, was not closed, or has no events;
-     with --allow-incomplete 0 instead
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("runs", nargs="+", type=Path, metavar="RUN", help="folder of a run, or its recording")
     add("--scene", type=Path, help="replay with this scene instead of the recorded one: what would it have decided?")
     add("--events", action="store_true", help="list the events")
     add("--picture", type=Path, metavar="FILE", help="draw the run: joint speeds, touch, arm (PNG, SVG, PDF)")
-    add(
-        "--allow-incomplete",
-        action="store_true",
-        help="exit with 0 where nothing differs as far as it can be compared, though blocks or all events are missing",
-    )
+    add("--allow-incomplete", action="store_true", help="exit with 0 where nothing differs but blocks are missing")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="another value in the scene: what if?")
     add("--vary", action="append", default=[], metavar="NAME=A,B,C", help="several values, each with each run")
     add("--table", type=Path, metavar="FILE", help="rows of many runs, for DuckDB or pandas (parquet)")
@@ -120,7 +114,6 @@ def _replay_one(args: argparse.Namespace) -> int:
 
 
 def _report(result: Replay, start: float, listed: bool) -> None:
-    from coneskin.core.text import printable
     from coneskin.robot.guard.signals.event_text import describe
     from coneskin.runs.replay.run import MOST_DIFFERENCES
 

@@ -1,23 +1,5 @@
-"""``coneskin studio``: design the sheets for a link in a browser."""
+"""``coneskin studio``: design the sheets for a link in a browser.
 
-from __future__ import annotations
-
-import argparse
-import sys
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from coneskin.core.text import positive_seconds
-
-from .terminal import page_timeout, show_page
-
-if TYPE_CHECKING:
-    from coneskin.design.link_design import LinkMesh
-    from coneskin.design.studio.workbench import Workbench
-
-__all__ = ["add_arguments", "run"]
-
-_EXAMPLE = """\
 examples:
   coneskin studio forearm.stl -o skin            the link, its sheets, handles, layers; "write" makes the folder skin
   coneskin studio robot.urdf#forearm_link -o skin --tolerance-mm 0.5
@@ -27,20 +9,31 @@ The folder is the one that `coneskin design` writes. The page is served to this 
 Exit code: 0 shown; 1 the link cannot be read, or a package is not installed; 2 wrong usage.
 """
 
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .terminal import add_page_options, show_page
+
+if TYPE_CHECKING:
+    from coneskin.design.link_design import LinkMesh
+    from coneskin.design.studio.workbench import Workbench
+
+__all__ = ["add_arguments", "run"]
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("link", metavar="LINK", help="mesh file (STL, OBJ, DAE, PLY), or FILE.urdf#LINK")
     add("-o", "--output", type=Path, default=Path("skin"), metavar="DIR", help="to write (default skin)")
     add("--force", action="store_true", help="replace an earlier design in the folder")
     add("--tolerance-mm", type=float, default=1.0, metavar="MM", help="largest distance to the mesh (1)")
     add("--unit", choices=("m", "cm", "mm", "inch"), help="unit of the mesh (default: guessed)")
-    add("--port", type=int, default=8090, help="to listen at, the next free one if it is taken (8090)")
-    add("--no-browser", action="store_true", help="open no browser: only print the address")
-    add("--json", action="store_true", help="print one JSON object: the address")
-    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
+    add_page_options(parser, 8090)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -58,6 +51,6 @@ def run(args: argparse.Namespace) -> int:
             print(f"looking for sheets in {args.link} ...", file=sys.stderr, flush=True)
         bench = bench_of(next(iter(load_link(args.link, args.unit))))
         page = StudioPage(server, bench, args.output, args.force, bench_of)
-        show_page(args, server.url, "the studio is at {} (Ctrl-C ends it)").wait(page_timeout(args))
+        show_page(args, server.url, "the studio is at {} (Ctrl-C ends it)").wait()
         del page
     return 0

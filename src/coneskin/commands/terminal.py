@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from coneskin.core.text import positive_seconds
+
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.reading import TouchReading
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
 __all__ = [
     "LiveReading",
     "Person",
+    "add_page_options",
     "ending_signals",
-    "page_timeout",
     "print_hint",
     "print_line",
     "show_page",
@@ -105,28 +107,36 @@ def ending_signals() -> Iterator[Callable[[], None]]:
             signal.signal(number, handler)
 
 
+def add_page_options(parser: argparse.ArgumentParser, port: int) -> None:
+    """Declare the options of a command that serves a page at a port."""
+    add = parser.add_argument
+    add("--port", type=int, default=port, help=f"to listen at, the next free one if it is taken ({port})")
+    add("--no-browser", action="store_true", help="open no browser: only print the address")
+    add("--json", action="store_true", help="print one JSON object: the address, or the file")
+    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
+
+
 def show_page(args: argparse.Namespace, url: str, words: str) -> threading.Event:
     """Say where a page is, and open it in a browser, as the options want it.
 
     Args:
-        args: with ``json`` and ``no_browser``.
+        args: with ``json``, ``no_browser`` and ``duration_s``.
         url: of the page.
         words: for people, with a place for the address.
 
     Returns:
-        the event that SIGTERM sets.
+        the event that SIGTERM or the end of the time sets.
     """
     over = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: over.set())
+    if args.duration_s is not None:
+        end = threading.Timer(min(args.duration_s, threading.TIMEOUT_MAX), over.set)
+        end.daemon = True
+        end.start()
     print(json.dumps({"url": url}) if args.json else words.format(url), flush=True)
     if not args.no_browser:
         webbrowser.open(url)
     return over
-
-
-def page_timeout(args: argparse.Namespace) -> float | None:
-    """Return for how long a page is shown [s]; None without an end."""
-    return None if args.duration_s is None else min(args.duration_s, threading.TIMEOUT_MAX)
 
 
 _LIVE_PERIOD = 0.2  # s between two lines of what is read now

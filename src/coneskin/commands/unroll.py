@@ -1,4 +1,13 @@
-"""Command ``coneskin unroll``: the flat sector of a truncated cone."""
+"""Command ``coneskin unroll``: the flat sector of a truncated cone.
+
+examples:
+  coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150
+  coneskin unroll --radius1-mm 54 --height-mm 434 --wrap-deg 300 --json     (a cylinder: one radius is enough)
+
+r1 belongs to radius 1 and r2 to radius 2, so r1 > r2 where the link narrows. The sector of a cylinder is a rectangle:
+r1 and r2 are infinite (null in JSON), theta0 is 0, and arc1 is the width.
+Exit code: 0; 1 there is no such cone; 2 wrong usage.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +21,9 @@ from .dimensions import add_key_options, given_keys
 
 __all__ = ["add_arguments", "run"]
 
-_EXAMPLES = """\
-examples:
-  coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150
-  coneskin unroll --radius1-mm 54 --height-mm 434 --wrap-deg 300 --json     (a cylinder: one radius is enough)
-
-r1 belongs to radius 1 and r2 to radius 2, so r1 > r2 where the link narrows. The sector of a cylinder is a rectangle:
-r1 and r2 are infinite (null in JSON), theta0 is 0, and arc1 is the width.
-Exit code: 0; 1 there is no such cone; 2 wrong usage.
-"""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.epilog = _EXAMPLES
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
     add_key_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
     parser.add_argument("--json", action="store_true", help="print one JSON object")

@@ -1,33 +1,5 @@
-"""``coneskin view``: see a guarded arm and its skin in a browser, live or from recordings."""
+"""``coneskin view``: see a guarded arm and its skin in a browser, live or from recordings.
 
-from __future__ import annotations
-
-import argparse
-import contextlib
-import json
-import os
-import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-from coneskin.core.errors import SceneError
-from coneskin.core.text import positive_seconds
-
-from .terminal import page_timeout, show_page
-
-if TYPE_CHECKING:
-    from coneskin.view.live_run import LiveRun
-    from coneskin.view.page_server import PageServer
-    from coneskin.view.stage.stage import Stage
-
-__all__ = ["add_arguments", "run"]
-
-_PAGE_WORDS = "the page is at {} (Ctrl-C ends it); it is no safety display"
-_NICE_LEVEL = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
-
-_EXAMPLE = """\
 examples:
   coneskin view scene.toml                            beside `coneskin guard scene.toml`: what happens now
   coneskin view runs/2026-01-31T12-00-00              scrub through a recording: play, speed, jump to an event
@@ -40,20 +12,39 @@ served to this computer alone, unless --host says otherwise. It is no safety dis
 Exit code: 0 shown, or written; 1 a scene or run cannot be read, or viser is not installed; 2 wrong usage.
 """
 
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coneskin.core.errors import SceneError
+
+from .terminal import add_page_options, show_page
+
+if TYPE_CHECKING:
+    from coneskin.view.live_run import LiveRun
+    from coneskin.view.page_server import PageServer
+    from coneskin.view.stage.stage import Stage
+
+__all__ = ["add_arguments", "run"]
+
+_PAGE_WORDS = "the page is at {} (Ctrl-C ends it); it is no safety display"
+_NICE_LEVEL = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    parser.epilog = _EXAMPLE
     add("what", nargs="+", type=Path, metavar="SCENE|RUN", help="scene file, or run folders (or their recordings)")
     add("--html", type=Path, metavar="FILE", help="write the runs into one HTML file; serve nothing")
-    add(
-        "--host", default="127.0.0.1", help="address to listen at; any but this computer's own lets its network look in"
-    )
-    add("--port", type=int, default=8080, help="to listen at, the next free one if it is taken (8080)")
-    add("--no-browser", action="store_true", help="open no browser: only print the address")
-    add("--json", action="store_true", help="print one JSON object: the address, or the file")
-    add("--duration-s", type=positive_seconds, metavar="S", help="end after this time [s]")
+    add("--host", default="127.0.0.1", help="to listen at; any but this computer's own lets its network look in")
+    add_page_options(parser, 8080)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -94,20 +85,15 @@ def _show(args: argparse.Namespace) -> int:
     with _server(args) as server:
         courses = read_courses(args.what)
         show_runs(server, courses)
-        show_page(args, server.url, _PAGE_WORDS).wait(page_timeout(args))
+        show_page(args, server.url, _PAGE_WORDS).wait()
     return 0
 
 
 def _follow_run(args: argparse.Namespace, recording: Path) -> int:
     from coneskin.view.live_run import LiveRun
 
-    first = LiveRun(recording)
-    runs = [first]
-
-    def find(_before: LiveRun | None) -> LiveRun | None:
-        return runs.pop() if runs else None
-
-    return _follow(args, first.course.stage, find)
+    runs = [LiveRun(recording)]
+    return _follow(args, runs[0].course.stage, lambda _: runs.pop() if runs else None)
 
 
 def _follow_scene(args: argparse.Namespace, path: Path) -> int:
@@ -139,9 +125,7 @@ def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[LiveRun | No
     if hasattr(os, "nice"):
         os.nice(_NICE_LEVEL)
     with _server(args) as server, contextlib.closing(LivePage(server, stage, find)) as page:
-        over = show_page(args, server.url, _PAGE_WORDS)
-        end = None if args.duration_s is None else time.monotonic() + args.duration_s
-        page.serve(over, lambda: end is not None and time.monotonic() >= end)
+        page.serve(show_page(args, server.url, _PAGE_WORDS))
     return 0
 
 
