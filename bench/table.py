@@ -93,6 +93,7 @@ BENCHES = {
     # recordings, the page, and the simulated controller
     "replay": Bench("bench.replay.recordings", "Damage that has a right checksum, and an idle machine."),
     "view": Bench("bench.view.page", "A GPU, or a browser on another computer: chromium drew in software."),
+    "view-colors": Bench("bench.view.colors", "Eyes: they are simulated (Machado, Oliveira and Fernandes 2009)."),
     "view-hours": Bench("bench.view.hours", "A GPU."),
     "view-endurance": Bench("bench.view.endurance", "Browsers: nobody looks at the page."),
     "ur-clients": Bench("bench.clients.trials", "A real controller's answers to the same clients."),

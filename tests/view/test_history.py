@@ -1,6 +1,7 @@
 """History of a run: what is shown at a time is what was recorded then."""
 
 import math
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,7 @@ from coneskin.view.contact_mark import FADING, ContactLog
 from coneskin.view.history import UNKNOWN, History, PhaseWords, _phase_after
 from coneskin.view.panel import event_list, state_of, status, timeline
 from coneskin.view.run_course import RunCourse, read_courses
-from coneskin.view.traces import _trace_names, traces
+from coneskin.view.traces import _envelope, _plots
 from tests.support.paths import COLLISION
 
 RUN = COLLISION
@@ -62,11 +63,18 @@ def touch(name: EventName, time: float, number: int = 1, **details: object) -> G
     return GuardEvent(name, time, {"number": number, **place, **details})
 
 
+def fed(events: Iterable[GuardEvent]) -> ContactLog:
+    log = ContactLog()
+    for one in events:
+        log.feed(one)
+    return log
+
+
 def test_a_touch_that_is_over_fades() -> None:
     ended = GuardEvent(EventName.TOUCH_ENDED, 2.0, {"sensor": "s"})  # as the guard tells it: one touch on a sensor
-    log = ContactLog().feed_all([touch(EventName.CONTACT, 1.0), touch(EventName.CONTACT, 1.5, 2, sensor="t"), ended])
+    log = fed([touch(EventName.CONTACT, 1.0), touch(EventName.CONTACT, 1.5, 2, sensor="t"), ended])
     assert [(mark.sensor, mark.strength) for mark in log.marks(2.0 + FADING)] == [("t", 1.0)]
-    log = ContactLog().feed_all([touch(EventName.CONTACT, 1.0), ended, GuardEvent(ended.name, 3.0, ended.details)])
+    log = fed([touch(EventName.CONTACT, 1.0), ended, GuardEvent(ended.name, 3.0, ended.details)])
     assert [mark.strength for mark in log.marks(2.0)] == [1.0]
     assert log.marks(2.0 + 0.5 * FADING)[0].strength == pytest.approx(0.5)
     assert log.marks(2.0 + FADING) == []
@@ -74,11 +82,11 @@ def test_a_touch_that_is_over_fades() -> None:
 
 @pytest.mark.parametrize("point", [None, [1.0, 2.0], [1.0, 2.0, "x"], [1e300, 0.0, 0.0], [math.nan, 0.0, 0.0], "abc"])
 def test_a_place_that_is_nonsense_has_no_mark(point: object) -> None:
-    assert ContactLog().feed_all([touch(EventName.CONTACT, 1.0, point=point)]).marks(1.0) == []
+    assert fed([touch(EventName.CONTACT, 1.0, point=point)]).marks(1.0) == []
 
 
 def test_a_page_that_stays_open_forgets_touches() -> None:
-    log = ContactLog().feed_all(touch(EventName.CONTACT, float(k), number=k) for k in range(2000))
+    log = fed(touch(EventName.CONTACT, float(k), number=k) for k in range(2000))
     assert len(log.marks(1e9)) == 400
 
 
@@ -126,15 +134,16 @@ def test_what_a_recording_says_is_never_taken_for_html() -> None:
 
 def test_traces_keep_the_peak(course: RunCourse) -> None:
     since, until = course.span
-    names = _trace_names([course])
-    assert names == ["touch level", "joint speed [rad/s]", "channels of forearm skin"]
-    (series,) = course.history.levels.values()
-    found = traces([course], "touch level", since, until)
-    assert np.nanmax(found.values) == max(value for (value,) in series.values)
-    assert found.times[np.nanargmax(found.values[0])] == pytest.approx(
-        series.times[int(np.argmax([value for (value,) in series.values]))] - course.zero, abs=(until - since) / 240
-    )
-    assert traces([course], "channels of forearm skin", since, until).values.shape == (6, 480)
+    plots = _plots([course])
+    assert list(plots) == ["touch level", "joint speed [rad/s]", "channels of forearm skin"]
+    ((_, series, column, zero),) = plots["touch level"]
+    edges = np.linspace(since, until, 241)
+    found = _envelope(series, column, zero, edges)
+    levels = [value for (value,) in series.values]
+    assert np.nanmax(found) == max(levels)
+    peak = series.times[int(np.argmax(levels))] - zero
+    assert edges[np.nanargmax(found) // 2] - 1e-9 <= peak <= edges[np.nanargmax(found) // 2 + 1] + 1e-9
+    assert len(plots["channels of forearm skin"]) == 6
 
 
 def test_the_timeline_has_a_band_for_each_phase(course: RunCourse) -> None:

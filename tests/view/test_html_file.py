@@ -1,13 +1,12 @@
 """File of a page: which file it replaces. What it shows is tested in a browser."""
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from coneskin.core.errors import RecordingError
-from coneskin.view.html_file import _LevelChanges, write_html
+from coneskin.view.html_file import _bar_changes, write_html
 from coneskin.view.page_server import page_client
 from coneskin.view.run_course import read_courses
 from coneskin.view.stage.level_scale import level_words
@@ -35,11 +34,8 @@ def test_a_page_is_replaced(tmp_path: Path) -> None:
 def test_the_last_change_is_the_level_of_the_run_within_a_percent() -> None:
     (course,) = read_courses([COLLISION])
     since, until = course.span
-    changes = _LevelChanges(course.stage.sheets)
     times = [since + (until - since) * k / 400 for k in range(401)]
-    for time in times:
-        changes.feed(time - since, course.moment(time))
-    data = changes.data()
+    data = _bar_changes(course, since, [time - since for time in times])
     (levels,), (words,), (sheet,) = data["levels"], data["words"], course.stage.sheets
     assert 3 < len(levels) < 401, "what has not changed is not said again"
     assert all(a[1] != b[1] for a, b in pairwise(levels))
@@ -52,11 +48,9 @@ def test_the_last_change_is_the_level_of_the_run_within_a_percent() -> None:
 
 def test_a_force_is_said_when_its_words_change() -> None:
     (course,) = read_courses([COLLISION])
-    moment = course.moment(course.span[0])
-    changes = _LevelChanges(course.stage.sheets)
     for time, force in enumerate((0.0, 0.04, 12.34, 12.32, 0.0)):
-        changes.feed(float(time), replace(moment, force=force))
-    assert changes.data()["forces"] == [(0.0, "0.0 N"), (2.0, "12.3 N"), (4.0, "0.0 N")]
+        course.history.forces.append(course.zero + time, (force,))
+    assert _bar_changes(course, 0.0, range(5))["forces"] == [(0.0, "0.0 N"), (2.0, "12.3 N"), (4.0, "0.0 N")]
 
 
 def test_a_drawn_trace_reaches_as_high_as_its_values() -> None:

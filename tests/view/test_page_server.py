@@ -9,7 +9,6 @@ import pytest
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.view.page_server import PageServer, page_client
-from coneskin.view.viser_client import unpacked
 
 pytest.importorskip("viser", reason="viser is not installed: no page is served")
 import msgspec
@@ -48,7 +47,7 @@ def test_the_page_is_given(server: PageServer) -> None:
 def test_the_page_has_the_script_for_computers_without_a_gpu(server: PageServer, path: str) -> None:
     status, body = get(server, path)
     assert status == 200
-    assert body.decode() == unpacked(page_client())
+    assert body.decode() == page_client()
     assert body.index(b"antialias: false") < body.index(b"<title")
 
 

@@ -13,18 +13,18 @@ RUN = COLLISION
 def test_the_events_of_one_run_count_from_its_start() -> None:
     (course,) = read_courses([RUN])
     lines = event_lines([course])
-    assert [line.event for line in lines] == course.history.events
-    for line in lines:
-        assert line.time == pytest.approx(line.event.time - read_run(RUN).start)
-        assert line.text.startswith(f"{line.time:.4f} s  ")
-        assert "run 1" not in line.text
+    assert [event for _, event, _ in lines] == course.history.events
+    for time, event, text in lines:
+        assert time == pytest.approx(event.time - read_run(RUN).start)
+        assert text.startswith(f"{time:.4f} s  ")
+        assert "run 1" not in text
 
 
 def test_the_events_of_two_runs_count_from_the_first_touch_and_say_whose_they_are() -> None:
     courses = read_courses([RUN, RUN])
     lines = event_lines(courses)
     assert len(lines) == 2 * len(courses[0].history.events)
-    assert [line.time for line in lines] == sorted(line.time for line in lines)
-    touches = [line for line in lines if line.event.name == EventName.CONTACT]
-    assert [line.text[:26] for line in touches] == ["0.0000 s  run 1: touch on ", "0.0000 s  run 2: touch on "]
-    assert min(line.time for line in lines) < 0.0
+    assert [time for time, *_ in lines] == sorted(time for time, *_ in lines)
+    touches = [text for _, event, text in lines if event.name == EventName.CONTACT]
+    assert [text[:26] for text in touches] == ["0.0000 s  run 1: touch on ", "0.0000 s  run 2: touch on "]
+    assert min(time for time, *_ in lines) < 0.0

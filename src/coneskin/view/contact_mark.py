@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -85,12 +85,6 @@ class ContactLog:
                 touch.held = math.inf
             while len(self._touches) > _MAX_TOUCHES:
                 del self._touches[next(iter(self._touches))]
-
-    def feed_all(self, events: Iterable[GuardEvent]) -> ContactLog:
-        """Take events in their order, and return itself."""
-        for event in events:
-            self.feed(event)
-        return self
 
     def marks(self, time: float) -> list[ContactMark]:
         """Return the marks that are seen at a time [s, host clock], the strongest first."""

@@ -95,20 +95,10 @@ class FieldChoice:
             if not np.array_equal(node.batched_colors, colours):
                 node.batched_colors = colours
             return
-        vertices, faces = SQUARE
-        self._nodes[name] = self._scene.add_batched_meshes_simple(
-            name,
-            np.array(vertices, dtype="float32"),
-            np.array(faces),
-            batched_wxyzs=patches.rotations,
-            batched_positions=patches.positions,
-            batched_scales=patches.sizes,
-            batched_colors=colours,
-            lod="off",
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        square = np.array(SQUARE[0], dtype="float32"), np.array(SQUARE[1])
+        look = {"batched_colors": colours, "side": "double", "cast_shadow": False, "receive_shadow": False}
+        there = {"batched_positions": patches.positions, "batched_scales": patches.sizes, "lod": "off"}
+        self._nodes[name] = self._scene.add_batched_meshes_simple(name, *square, patches.rotations, **there, **look)
 
     def _clear(self) -> None:
         for node in self._nodes.values():

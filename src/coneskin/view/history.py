@@ -249,18 +249,10 @@ class History:
             self.phases.append(_PhaseChange(event.time, phase))
 
     def _take_frame(self, sensor: str, time: float, frame: Frame) -> None:
-        supplies = frame.touch_supply or 1, frame.radial_supply or 1, frame.angular_supply or 1
-        level = min((frame.touch_c + frame.touch_d) / (2.0 * supplies[0]), 1.0)
-        channels = (
-            min(frame.touch_c / supplies[0], 1.1),
-            min(frame.touch_d / supplies[0], 1.1),
-            min(frame.radial_c / supplies[1], 1.1),
-            min(frame.radial_d / supplies[1], 1.1),
-            min(frame.angular_a / supplies[2], 1.1),
-            min(frame.angular_b / supplies[2], 1.1),
-        )
-        self.levels[sensor].append(time, (level,))
-        self.channels[sensor].append(time, channels)
+        supplies = (getattr(frame, f"{name[:-2]}_supply") or 1 for name in CHANNELS)
+        shares = [getattr(frame, name) / supply for name, supply in zip(CHANNELS, supplies, strict=True)]
+        self.levels[sensor].append(time, (min(0.5 * (shares[0] + shares[1]), 1.0),))
+        self.channels[sensor].append(time, tuple(min(share, 1.1) for share in shares))
 
 
 def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | None:

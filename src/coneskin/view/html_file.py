@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ from coneskin.core.files import draft_of
 
 from .page_server import PageServer, page_client
 from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline
-from .run_course import Moment, RunCourse, event_lines
-from .stage.level_scale import force_words, level_bars, level_words
+from .run_course import RunCourse, event_lines
+from .stage.level_scale import level_bars, level_words
 from .stage.sheet_surface import SheetSurface
 from .stage_nodes import StageNodes, look_at_stages
 from .traces import trace_drawings
@@ -27,35 +27,6 @@ from .traces import trace_drawings
 __all__ = ["write_html"]
 
 _LEVEL_STEPS = 100  # of a level, which a bar can show
-
-
-class _LevelChanges:
-    """Changes of one run, taken moment by moment.
-
-    Args:
-        sheets: of its stage.
-    """
-
-    def __init__(self, sheets: Sequence[SheetSurface]) -> None:
-        self._sheets = sheets
-        self._levels: list[list[tuple[float, int]]] = [[] for _ in sheets]
-        self._forces: list[tuple[float, str]] = []
-
-    def feed(self, time: float, moment: Moment) -> None:
-        """Take what is seen at a time [s], later than those before; what has not changed is passed over."""
-        for sheet, changes in zip(self._sheets, self._levels, strict=True):
-            level = round(_LEVEL_STEPS * min(max(moment.levels[sheet.name], 0.0), 1.0))
-            if not changes or changes[-1][1] != level:
-                changes.append((round(time, 4), level))
-        if moment.force is not None and (not self._forces or self._forces[-1][1] != force_words(moment.force)):
-            self._forces.append((round(time, 4), force_words(moment.force)))
-
-    def data(self) -> dict[str, Any]:
-        """Return the changes for JSON: of each sheet level [%] and the words for each level; of the force its words."""
-        words = [
-            [level_words(sheet, level / _LEVEL_STEPS) for level in range(_LEVEL_STEPS + 1)] for sheet in self._sheets
-        ]
-        return {"levels": self._levels, "words": words, "forces": self._forces}
 
 
 _PICTURE_RATE = 30.0  # pictures a second ...
@@ -164,8 +135,8 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     since, until = min(item.span[0] for item in courses), max(item.span[1] for item in courses)
     duration = max(until - since, 1e-3)
     count = min(max(2, int(duration * _PICTURE_RATE)), _MAX_PICTURES)
-    changes = [_LevelChanges(course.stage.sheets) for course in courses]
-    scene = _serialized(courses, since, _pictures(courses, since, duration, count), changes)
+    pictures = _pictures(courses, since, duration, count)
+    scene = _serialized(courses, since, pictures)
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
         f"<title>coneskin: {escape(courses[0].stage.title)}</title><style>{_PAGE_STYLE}</style>"
@@ -174,7 +145,7 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     page = page_client()
     page = page.replace("</head>", f"{head}</head>", 1)
     at = page.rindex("</body>")
-    page = page[:at] + _panel(courses, since, until, changes) + page[at:]
+    page = page[:at] + _panel(courses, since, until, pictures) + page[at:]
     try:
         with draft_of(path, overwrite=True) as draft:
             draft.write_text(page, encoding="utf-8")
@@ -199,14 +170,12 @@ def _check_target(path: Path) -> None:
 def _pictures(courses: Sequence[RunCourse], since: float, duration: float, count: int) -> list[float]:
     """Return the times of the pictures from the first one on [s]: even steps, and one just after each event."""
     even = {duration * picture / (count - 1) for picture in range(count)}
-    events = {line.time - since + _EVENT_DELAY for line in event_lines(courses)[:_MAX_EVENTS]}
+    events = {time - since + _EVENT_DELAY for time, _, _ in event_lines(courses)[:_MAX_EVENTS]}
     return sorted(even | {at for at in events if 0.0 <= at < duration})
 
 
-def _serialized(
-    courses: Sequence[RunCourse], since: float, pictures: Sequence[float], changes: Sequence[_LevelChanges]
-) -> bytes:
-    """Return the scene and its pictures as viser's client reads them, and take the levels of each picture."""
+def _serialized(courses: Sequence[RunCourse], since: float, pictures: Sequence[float]) -> bytes:
+    """Return the scene and its pictures as viser's client reads them."""
     with PageServer("coneskin", port=0x2F00) as server:
         taken = server.serializer()
         reach = max(course.stage.reach for course in courses)
@@ -221,26 +190,42 @@ def _serialized(
             if at > before:
                 taken.insert_sleep(at - before)
             before = at
-            for course, drawn, levels in zip(courses, nodes, changes, strict=True):
-                moment = course.moment(since + at)
-                drawn.show(moment)
-                levels.feed(at, moment)
+            for course, drawn in zip(courses, nodes, strict=True):
+                drawn.show(course.moment(since + at))
         return bytes(taken.serialize())
 
 
-def _panel(courses: Sequence[RunCourse], since: float, until: float, changes: Sequence[_LevelChanges]) -> str:
+def _bar_changes(course: RunCourse, since: float, pictures: Sequence[float]) -> dict[str, Any]:
+    """Return for JSON when the bars of a run change: of each sheet level [%] and words for each, of the force words."""
+    history, sheets = course.history, course.stage.sheets
+
+    def changes(what: Callable[[float], object]) -> list[tuple[float, object]]:
+        found: list[tuple[float, object]] = []
+        for at in pictures:
+            if (now := what(course.zero + since + at)) is not None and (not found or found[-1][1] != now):
+                found.append((round(at, 4), now))
+        return found
+
+    def level(sheet: SheetSurface) -> Callable[[float], int]:
+        return lambda time: round(_LEVEL_STEPS * min(max(history.level(sheet.name, time), 0.0), 1.0))
+
+    words = [[level_words(sheet, step / _LEVEL_STEPS) for step in range(_LEVEL_STEPS + 1)] for sheet in sheets]
+    forces = changes(lambda time: None if (force := history.force(time)) is None else f"{force:.1f} N")
+    return {"levels": [changes(level(sheet)) for sheet in sheets], "words": words, "forces": forces}
+
+
+def _panel(courses: Sequence[RunCourse], since: float, until: float, pictures: Sequence[float]) -> str:
     several = len(courses) > 1
-    runs, bars = [], []
-    for course, levels in zip(courses, changes, strict=True):
-        runs.append(levels.data())
-        force = course.history.force(course.zero + since)
+    bars = []
+    for number, course in enumerate(courses, 1):
         none = {sheet.name: 0.0 for sheet in course.stage.sheets}
-        bars.append(level_bars(course.stage.sheets, none, force, f"run {len(runs)}" if several else ""))
+        force = course.history.force(course.zero + since)
+        bars.append(level_bars(course.stage.sheets, none, force, f"run {number}" if several else ""))
     lines = event_lines(courses)[:_MAX_EVENTS]
-    heads = {at - since: _head(courses, at) for at in dict.fromkeys([since, *(line.time for line in lines)])}
-    events = [(line.time - since, " ".join(line.text.split())) for line in lines]
-    facts = {"since": since, "duration": max(until - since, 1e-3), "heads": list(heads.items())}
-    data = {**facts, "runs": runs, "events": events}
+    heads = {at - since: _head(courses, at) for at in dict.fromkeys([since, *(time for time, _, _ in lines)])}
+    events = [(time - since, " ".join(text.split())) for time, _, text in lines]
+    facts = {"since": since, "duration": max(until - since, 1e-3), "heads": list(heads.items()), "events": events}
+    data = {**facts, "runs": [_bar_changes(course, since, pictures) for course in courses]}
     text = json.dumps(data).replace("<", "\\u003c")  # so that no word of a recording ends the element
     title = "" if several else f'<div class="coneskin-title">{escape(courses[0].stage.title)}</div>'
     return (

@@ -49,37 +49,29 @@ class LivePage:
     def __init__(self, server: PageServer, stage: Stage, find: Callable[[LiveRun | None], LiveRun | None]) -> None:
         self._server, self._stage, self._find = server, stage, find
         self._run: LiveRun | None = None
-        self._drawn = stage
-        self._nodes: StageNodes | None = None
-        self._texted = self._plotted = self._searched = -1e9
+        self._searched = self._texted = self._plotted = -1e9
         self._newest_event: object = None
+        self._nodes: StageNodes
         gui = server.gui
         gui.add_html(NOTICE)
         self._status, self._clock = gui.add_html(""), gui.add_html("")
-        gui.add_html('<div id="coneskin-stale"></div>')  # for the page's script alone
         self._past, self._levels, self._events = gui.add_html(""), gui.add_html(""), gui.add_html("")
         gui.add_html(PAGE_LEGEND)
-        self._playout = Playout()
         self._choices: dict[int, FieldChoice] = {}
         self._entering = threading.Lock()  # viewers come and go in threads of their own
         self._stand(stage)
         server.on_viewer(self._enter)
 
-    def serve(self, over: threading.Event, ended: Callable[[], bool] = lambda: False) -> None:
-        """Show what happens until an event is set, or ``ended`` says so.
-
-        Args:
-            over: ends the page.
-            ended: asked with each picture.
-        """
+    def serve(self, over: threading.Event) -> None:
+        """Show what happens until an event is set."""
         due = 0.0
-        while not over.is_set() and not ended():
+        while not over.is_set():
             now = time.monotonic()
             news = self.poll(now)
             if now >= due or news:
                 self.draw(now)
                 if now >= due:  # the next one on time, unless this one was late by more than that
-                    due = due + _PICTURE_PERIOD if now < due + _PICTURE_PERIOD else now + _PICTURE_PERIOD
+                    due = max(due, now - _PICTURE_PERIOD) + _PICTURE_PERIOD
             over.wait(max(0.0, min(_POLL_PERIOD, due - time.monotonic())))
 
     def poll(self, now: float) -> bool:
@@ -132,7 +124,6 @@ class LivePage:
         course = self._run.course
         at = course.history.until - course.zero
         moment = course.moment(at, self._playout.time(at, now))
-        assert self._nodes is not None
         with self._server.together():
             self._nodes.show(moment)
         newest = course.history.events[-1] if course.history.events else None
@@ -170,13 +161,9 @@ class LivePage:
         return leave
 
     def _stand(self, stage: Stage) -> None:
-        """Draw a stage in the place of the one before, unless it looks the same."""
-        self._playout, self._newest_event = Playout(), self
+        """Draw a stage in the place of the one before."""
+        self._drawn, self._playout, self._newest_event = stage, Playout(), self
         self._texted = self._plotted = -1e9
-        if self._nodes is not None and self._drawn.same_shape(stage):
-            self._drawn = stage
-            return
-        self._drawn = stage
         scene, reach = self._server.scene, stage.reach
         with self._entering:
             for choice in self._choices.values():

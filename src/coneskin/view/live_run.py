@@ -7,17 +7,12 @@ locked, and the guard does not know that somebody reads.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
-from coneskin.core.errors import RecordingError
-from coneskin.core.recording.block import Block
 from coneskin.core.recording.reader import parts_of
 from coneskin.core.recording.tail import RecordingTail
-from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind
-from coneskin.runs.replay.run import Run
+from coneskin.runs.replay.run import Run, read_header
 
 from .history import History
 from .run_course import RunCourse
@@ -50,7 +45,8 @@ class LiveRun:
         self._tail = RecordingTail(path, KEPT, _KINDS_KEPT)
         try:
             blocks = self._tail.read()
-            run = Run(_header(blocks, path), blocks)
+            first = next((block for block in blocks if block.kind == BlockKind.HEADER), None)
+            run = Run(read_header(first, path), blocks)
             scene = run.scene()
             history = History(scene, KEPT)
             history.feed_all(blocks)
@@ -101,15 +97,3 @@ def find_live_run(folder: Path) -> Path | None:
     """Return the recording in a folder of runs that grows now, the newest of several; None without any."""
     found = [path for path in folder.glob("*/run.rec") if is_live(path)]
     return max(found, key=lambda path: path.stat().st_mtime, default=None)
-
-
-def _header(blocks: Iterable[Block], path: Path) -> dict[str, Any]:
-    for block in blocks:
-        if block.kind == BlockKind.HEADER:
-            try:
-                header = read_json(block.payload)
-            except ValueError as exc:
-                raise RecordingError(f"the header of {path} is damaged: {exc}") from exc
-            if isinstance(header, dict) and isinstance(header.get("scene"), str):
-                return header
-    raise RecordingError(f"{path} has no header yet: nothing of it can be shown")

@@ -1,4 +1,4 @@
-"""Style and script of the panel in a browser, of a page that Python serves and of a page in a file.
+"""Style and scripts of a page in a browser, of one that Python serves and of one in a file.
 
 The browser counts by itself how old the page is, so that a guard, a server or a network that is silent shows. Its clock
 and the server's differ by what the quickest message took, which may drift by as much as two poor crystals.
@@ -21,7 +21,6 @@ _PANEL_STYLE = """
 background:repeating-linear-gradient(45deg,#6b7280 0 8px,#5b616d 8px 16px)}
 .coneskin-old .coneskin-phase::before{content:"\\2715  "}
 .coneskin-old canvas[data-engine],.coneskin-old #coneskin-timeline{filter:grayscale(1) opacity(.35)}
-#coneskin-stale{background:#111827;color:#fbbf24;padding:6px 10px}#coneskin-stale:empty{display:none}
 #coneskin-clock{font:13px monospace}
 .coneskin-card{border-left:6px solid #4a0d18;background:#f3f4f6;color:#111827;font-size:12px;padding:4px 8px}
 .coneskin-card th{text-align:left;font-weight:600;padding-right:1em;vertical-align:top;white-space:nowrap}
@@ -29,7 +28,7 @@ background:repeating-linear-gradient(45deg,#6b7280 0 8px,#5b616d 8px 16px)}
 #coneskin-events{font:11px/1.5 monospace}
 #coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
 display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
-#coneskin-events>div:hover,#coneskin-events>div:focus,#coneskin-events>div.now{display:block}
+#coneskin-events>div:hover,#coneskin-events>div:focus{display:block}
 #coneskin-events>.alarm{color:#8f1421}#coneskin-events>.now{font-weight:700}#coneskin-events>.ahead{opacity:.45}
 .coneskin-timeline{position:relative;margin:4px 10px 0;overflow:hidden}#coneskin-timeline{width:100%;display:block}
 .coneskin-cursor,.coneskin-pointer{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
@@ -37,17 +36,19 @@ display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
 .coneskin-plot{position:relative;overflow:hidden;border-bottom:1px solid #111827;border-left:1px solid #111827}
 .coneskin-plot svg{display:block;width:100%;background:#f9fafb}
 .coneskin-plot>span{position:absolute;left:3px;background:#f9fafbcc;color:#111827}.coneskin-read{min-height:1.4em}
-.coneskin-ends{display:flex;justify-content:space-between}#coneskin-top{display:none}@media(max-width:700px){
-#coneskin-top{display:block;position:fixed;z-index:20;left:0;right:0;top:0;background:#fff;padding:2px 0 4px;
-max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}#root .coneskin-phase,
-#root .coneskin-card,[class*=Notifications-root]{display:none!important}}
+.coneskin-ends{display:flex;justify-content:space-between}[class*=Notifications-root]{display:none!important}
+#coneskin-top{position:fixed;z-index:20;left:0;top:0}#coneskin-top>div:not(#coneskin-stale){display:none}
+#coneskin-stale{background:#111827;color:#fbbf24;padding:6px 10px;font-size:15px}#coneskin-stale:empty{display:none}
+@media(max-width:700px){#root .coneskin-phase,#root .coneskin-card{display:none!important}
+#coneskin-top>div:not(#coneskin-stale){display:block}
+#coneskin-top{right:0;background:#fff;padding:2px 0 4px;max-height:45vh;overflow:auto;box-shadow:0 1px 6px #0006}}
 """
 
 _PANEL_SCRIPT = """
 (function () {
   const all = (words) => [...document.querySelectorAll(words)];
   const put = (place, key, value) => { if (place[key] !== value) place[key] = value; };
-  let sent = 0, offset = Infinity, looked = 0, chosen = '0', pointer = null;
+  let sent = 0, offset = Infinity, looked = 0, chosen = '0', pointer = null, folded = false;
   function silence(clock) {  // of the guard and of the page's server [s]
     const now = performance.now() / 1e3, told = Number(clock.dataset.sent);
     if (told < sent) offset = Infinity;  // another server
@@ -60,26 +61,30 @@ _PANEL_SCRIPT = """
   function follow() {
     const clock = document.getElementById('coneskin-clock');
     if (clock === null) return;
+    let words = '';
     if (clock.dataset.sent) {
       const [guard, server] = silence(clock), over = clock.dataset.over, old = over || guard > 1;
       document.documentElement.classList.toggle('coneskin-old', Boolean(old));
       all('#root .coneskin-phase').forEach((phase) => put(phase, 'textContent', !old ? phase.dataset.text
         : `was ${phase.dataset.text}${over ? ': the run is over' : `, ${Math.floor(guard)} s ago`}`));
-      const who = server > 1 ? 'page\\'s server' : 'guard';
-      const words = over ? 'the run is over: this is its last moment'
-        : old ? `NOTHING NEW from the ${who} for ${Math.floor(guard)} s: what is drawn is old` : '';
-      all('#coneskin-stale').forEach((line) => put(line, 'textContent', words));
-      let top = document.getElementById('coneskin-top');
-      if (top === null) {
-        top = Object.assign(document.body.appendChild(document.createElement('div')), { id: 'coneskin-top' });
-      }
-      const parts = all('#root .coneskin-phase, #root .coneskin-card').map((part) => part.outerHTML).join('');
-      if (top.coneskin !== parts) { top.innerHTML = parts; top.coneskin = parts; }
+      words = over ? 'the run is over: this is its last moment' : old ? `NOTHING NEW from the ${server > 1
+        ? "page's server" : 'guard'} for ${Math.floor(guard)} s: what is drawn is old` : '';
     }
+    all('#root .coneskin-phase').slice(0, 1).forEach(() => showOnTop(words));
     if (clock.dataset.share) all('.coneskin-cursor').forEach((line) => put(line.style, 'left', clock.dataset.share));
     all('#coneskin-traces select').forEach((choice) => put(choice, 'value', chosen));
     all('.coneskin-trace').forEach((trace, k) => put(trace, 'hidden', String(k) !== chosen));
     all('.coneskin-plot').forEach(read);
+  }
+  function showOnTop(words) {  // of the scene what is old; in a narrow window phase and card too, and the panel folded
+    const top = document.getElementById('coneskin-top')
+      || Object.assign(document.body.appendChild(document.createElement('div')), { id: 'coneskin-top' });
+    const parts = all('#root .coneskin-phase, #root .coneskin-card').map((part) => part.outerHTML);
+    const shown = `<div id="coneskin-stale">${words}</div>${parts.join('')}`;
+    if (top.shown !== shown) top.innerHTML = top.shown = shown;
+    const handle = all('#root div').find((div) => div.style.height === '3.5em' && div.style.cursor === 'pointer');
+    if (handle && !folded) handle.click();  // of viser's panel for a narrow window
+    folded = folded || Boolean(handle);
   }
   function read(plot) {  // the values under the pointer
     const box = plot.getBoundingClientRect(), line = plot.querySelector('.coneskin-pointer');
@@ -105,5 +110,33 @@ _PANEL_SCRIPT = """
   setInterval(follow, 100);
 })();
 """
-#: for the head of a page
-PANEL_HEAD = f"<style id=coneskin-style>{_PANEL_STYLE}</style><script>{_PANEL_SCRIPT}</script>"
+# viser smooths edges and copies each picture for a server that may ask. Without a GPU the first takes a third of a
+# picture's time (bench/RESULTS.md), so a worker asks what draws, while the page is still read.
+_PLAIN_EDGES_SCRIPT = """
+(function () {
+  const plain = HTMLCanvasElement.prototype.getContext;
+  const inSoftware = (gl) => {
+    if (gl === null) return false;
+    const told = gl.getExtension('WEBGL_debug_renderer_info');
+    const name = String(gl.getParameter(told === null ? gl.RENDERER : told.UNMASKED_RENDERER_WEBGL));
+    const lose = gl.getExtension('WEBGL_lose_context');
+    if (lose !== null) lose.loseContext();
+    return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+  };
+  let software = null;
+  const ask = `postMessage((${inSoftware})(new OffscreenCanvas(1, 1).getContext('webgl2')))`;
+  const asked = new Worker(URL.createObjectURL(new Blob([ask])));
+  asked.onmessage = (event) => { software = event.data; asked.terminate(); };
+  HTMLCanvasElement.prototype.getContext = function (kind, wanted, ...more) {
+    if (kind !== 'webgl2' || !wanted || !wanted.antialias) return plain.call(this, kind, wanted, ...more);
+    if (software === null) software = inSoftware(plain.call(document.createElement('canvas'), 'webgl2'));
+    const cheap = { ...wanted, antialias: false, preserveDrawingBuffer: false };
+    return plain.call(this, kind, software ? cheap : wanted, ...more);
+  };
+})();
+"""
+#: for the head of a page, before anything that draws
+PANEL_HEAD = (
+    f"<style id=coneskin-style>{_PANEL_STYLE}</style><script>{_PLAIN_EDGES_SCRIPT}</script>"
+    f"<script>{_PANEL_SCRIPT}</script>"
+)

@@ -16,7 +16,6 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
 from .page_script import PANEL_HEAD
-from .viser_client import unpacked, with_head, with_plain_edges
 
 __all__ = ["LOOPBACK", "PageServer", "page_client"]
 
@@ -34,14 +33,17 @@ def _viser() -> Any:
     return viser
 
 
-def page_client() -> str:
-    """Return the HTML of viser's client, with the panel's script, as a file contains it; it is served unpacked.
+def page_client(head: str = PANEL_HEAD) -> str:
+    """Return the HTML of viser's client, whose head begins with style and scripts of the panel.
+
+    Args:
+        head: what it begins with.
 
     Raises:
         MissingExtra: viser is not installed.
     """
     client = Path(_viser().__file__).parent / "client" / "build" / "index.html"
-    return with_head(with_plain_edges(client.read_text(encoding="utf-8")), PANEL_HEAD)
+    return client.read_text(encoding="utf-8").replace("<head>", f"<head>{head}", 1)
 
 
 class PageServer:
@@ -57,6 +59,8 @@ class PageServer:
         gate: in front of it.
         scene: what all viewers see: viser's ``SceneApi``.
         gui: the panel that all viewers see: viser's ``GuiApi``.
+        together: context in which changes are sent at once, so that no picture shows half of them.
+        serializer: makes viser's serializer, which takes up what the scene is told from now on.
         url: of the page.
 
     Raises:
@@ -78,12 +82,13 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        page = with_head(unpacked(page_client()), uploads)
+        page = page_client(uploads + PANEL_HEAD)
         self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _MAX_UPLOAD_SIZE} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=host, port=port, label=title, verbose=False)
-        self.scene, self.gui = self._server.scene, self._server.gui
+        self.scene, self.gui, self.together = self._server.scene, self._server.gui, self._server.atomic
+        self.serializer = self._server.get_scene_serializer
         shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
         self.url = f"http://{f'[{shown}]' if ':' in shown else shown}:{self._server.get_port()}"
         self._wake_from_its_own_thread()
@@ -134,6 +139,8 @@ class PageServer:
         ends: dict[int, Callable[[], None]] = {}
 
         def connected(client: Any) -> None:
+            if (aspect := client.camera.aspect) < 1.0:  # a phone's window is as wide as others are high
+                client.camera.fov = 2.0 * math.atan(math.tan(0.5 * _FIELD_OF_VIEW) / aspect)
             ends[client.client_id] = begin(client)
 
         def gone(client: Any) -> None:
@@ -142,16 +149,6 @@ class PageServer:
 
         self._server.on_client_connect(connected)
         self._server.on_client_disconnect(gone)
-
-    @contextlib.contextmanager
-    def together(self) -> Iterator[None]:
-        """Send what is changed inside at once, so that no picture shows half of it."""
-        with self._server.atomic():
-            yield
-
-    def serializer(self) -> Any:
-        """Return viser's serializer, which takes up what the scene is told from now on."""
-        return self._server.get_scene_serializer()
 
     def close(self) -> None:
         """End the server."""

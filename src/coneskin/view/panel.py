@@ -25,7 +25,7 @@ PAGE_LEGEND = (
     '<details id="coneskin-legend" open><summary>What you see</summary>'
     "Dark blue: a sheet of skin. Its edge and its bar turn magenta at a touch, pale yellow at a firm one.<br>"
     "Ring, disc and arrow: the place of a touch, where it is with 95 %, and the outward normal. "
-    "No disc: not certain yet. The touch that stopped the arm stays until the reset.<br>"
+    "No disc: not certain, or not told. The touch that stopped the arm stays until the reset.<br>"
     "&#9654; active, &#9670; the arm reacts, &#9632; it is stopped, ? not active, "
     "&#10005; grey: old, nothing new comes.</details>"
 )
@@ -81,9 +81,10 @@ def _stop_rows(
     try:
         if (contact := stopping_contact(stop, events)) is not None:
             d = contact.details
-            reach = "" if d.get("ellipse") is None else f" +- {max(0.1, 1e3 * math.hypot(*d['ellipse'][0])):.1f} mm"
-            sure = "" if d["location_valid"] else ", not certain"
-            place = f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg{reach}{sure}"
+            told = d.get("ellipse")
+            sure = "error not told" if told is None else f"+- {max(0.1, 1e3 * math.hypot(*told[0])):.1f} mm (95 %)"
+            sure = sure if d["location_valid"] else "not certain"
+            place = f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg, {sure}"
             rows += [("touch", f"{d['sensor']} ({d['link']})"), ("place", place), ("level", f"{d['level']:.2f}")]
         else:
             rows += zip(("cause", "remedy"), _cause_and_remedy(stop.details["why"]), strict=True)

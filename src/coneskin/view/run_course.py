@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RecordingError
 from coneskin.geometry.pose import Pose, Vector
@@ -85,29 +85,18 @@ class RunCourse:
         return Moment(at, stage.poses(history.q(then)), levels, *seen, stage.moved(history.places(then)))
 
 
-class _EventLine(NamedTuple):
-    """Event in words.
+def event_lines(courses: Sequence[RunCourse]) -> list[tuple[float, GuardEvent, str]]:
+    """Return the events of runs in the order of the page's clock: each one's time there [s], itself, and its words.
 
-    Attributes:
-        time: on the page's clock [s].
-        event: what happened.
-        text: for people; of several runs, it says in which.
+    Of several runs the words say in which it happened.
     """
-
-    time: float
-    event: GuardEvent
-    text: str
-
-
-def event_lines(courses: Sequence[RunCourse]) -> list[_EventLine]:
-    """Return the events of runs in the order of the page's clock, by which they count."""
     found = []
     for number, course in enumerate(courses, 1):
         whose = f"run {number}: " if len(courses) > 1 else ""
         for event in course.history.events:
             time, _, words = describe(event, course.zero).strip().partition("  ")
-            found.append(_EventLine(event.time - course.zero, event, f"{time}  {whose}{words}"))
-    return sorted(found, key=lambda line: line.time)
+            found.append((event.time - course.zero, event, f"{time}  {whose}{words}"))
+    return sorted(found, key=lambda line: line[0])
 
 
 def read_courses(paths: Sequence[Path]) -> list[RunCourse]:

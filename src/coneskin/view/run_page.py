@@ -59,9 +59,9 @@ class _Player:
             for number, course in enumerate(courses, 1)
         ]
         lines = event_lines(courses)
-        self._times = [line.time for line in lines]
-        self._lines = [(line.event, line.text) for line in lines]
-        self._jumps = [index for index, line in enumerate(lines) if line.event.name in _JUMP_EVENTS]
+        self._times = [time for time, _, _ in lines]
+        self._lines = [(event, text) for _, event, text in lines]
+        self._jumps = [index for index, (event, _) in enumerate(self._lines) if event.name in _JUMP_EVENTS]
         self._make_panel(client.gui)
         self._shown = -2
         self._texted = -1.0
@@ -86,7 +86,8 @@ class _Player:
         )
         self._buttons = gui.add_button_group("", ("play", "pause", "|<", "<", ">"))
         self._speed = gui.add_dropdown("speed", list(_SPEED_CHOICES), initial_value="1x")
-        choices = ["jump to an event", *(self._choice(index) for index in self._jumps[:500])]
+        told = (f"{index}: {' '.join(self._lines[index][1].split())[:70]}" for index in self._jumps[:500])
+        choices = ["jump to an event", *told]
         self._levels = gui.add_html("")
         self._field = FieldChoice(
             self._client, [(course.stage, f"/run {number}") for number, course in enumerate(self._strands, 1)]
@@ -100,9 +101,6 @@ class _Player:
         self._speed.on_update(self._speeded)
         self._jump.on_update(self._jumped)
         self._field.on_update(lambda _event: self._do(lambda _playback: None))
-
-    def _choice(self, index: int) -> str:
-        return f"{index}: {' '.join(self._lines[index][1].split())[:70]}"
 
     def _sought(self, event: Any) -> None:
         if event.client is not None:  # not our own change

@@ -24,10 +24,11 @@ if TYPE_CHECKING:
     from .stage.solids import Solid
     from .stage.stage import Stage
 
-__all__ = ["StageNodes", "light_plainly", "look_at_stages"]
+__all__ = ["LOCATED", "StageNodes", "light_plainly", "look_at_stages"]
 
 _MARKS_PER_LINK = 6  # nodes for contacts on each link with a sheet, used again and again
-_LOCATED, _UNCERTAIN, _PAST = (214, 70, 224), (249, 115, 22), (150, 143, 138)
+LOCATED = (214, 70, 224)  #: colour of a mark whose place is certain
+_UNCERTAIN, _PAST = (249, 115, 22), (150, 143, 138)
 _FLOOR, _RIM = (175, 175, 180), (150, 180, 205)
 _ARROW_LENGTH = 0.14  # m; length of the arrow along the normal
 _MIN_HALF_AXIS = 0.004  # m; half axes of an ellipse that can still be seen
@@ -60,9 +61,9 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
         reach: how far anything can be from its base [m].
         count: stages side by side.
     """
-    away = 0.5 * reach
+    away = 0.6 * reach
     if count == 1:
-        server.look_from((-away, -away, 0.6 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
+        server.look_from((-away, -away, 0.7 * reach), (-0.1 * reach, 0.0, 0.3 * reach))  # most arms work to that side
     else:  # from in front, so that none stands before another
         server.look_from((-away * (0.7 + count), 0.0, 0.7 * reach), (0.0, 0.0, 0.28 * reach))
     light_plainly(server.scene)
@@ -149,7 +150,7 @@ class _MarkNodes:
     def _draw(self, mark: ContactMark, side: PlacedFrustum, strength: float) -> None:
         import numpy as np
 
-        colour = _PAST if strength < 1.0 else _LOCATED if mark.located else _UNCERTAIN
+        colour = _PAST if strength < 1.0 else LOCATED if mark.located else _UNCERTAIN
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         arrow, faces = _arrow()
         there = Pose.trusted(along(mark.normal).rotation, mark.point)
@@ -160,7 +161,7 @@ class _MarkNodes:
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
         ring = np.stack([radius * circle for radius in _RING_RADII])
         _add_mesh(self._scene, f"{self._name}/ring", *_on_sheet(side, mark.point, ring), colour, shade)
-        disc = circle @ _half_axes(mark, side) * (1.0 if mark.located else 1e-3)
+        disc = circle @ _half_axes(mark, side)
         uncertainty = _on_sheet(side, mark.point, np.stack([1e-3 * disc, disc]))
         _add_mesh(self._scene, f"{self._name}/uncertainty", *uncertainty, colour, shade)
 
@@ -186,13 +187,8 @@ def _add_solid(scene: Any, name: str, solid: Solid) -> None:
 
 def _arrow() -> tuple[NDArray[np.float32], Ints]:
     head, shaft, width = 0.035, 0.0035, 0.010
-    profile = [
-        (0.0, 0.0),
-        (shaft, 0.0),
-        (shaft, _ARROW_LENGTH - head),
-        (width, _ARROW_LENGTH - head),
-        (0.0, _ARROW_LENGTH),
-    ]
+    neck = _ARROW_LENGTH - head
+    profile = [(0.0, 0.0), (shaft, 0.0), (shaft, neck), (width, neck), (0.0, _ARROW_LENGTH)]
     vertices, faces = revolve(profile, 16)
     return _single(vertices), faces
 
@@ -216,11 +212,11 @@ def _on_sheet(side: PlacedFrustum, point: Vector, rows: Floats) -> tuple[NDArray
 
 
 def _half_axes(mark: ContactMark, side: PlacedFrustum) -> Floats:
-    """Return the half axes of a mark along u and around [m], shape (2, 2), none too short to be seen."""
+    """Return the half axes of a mark along u and around [m], shape (2, 2): long enough to be seen, or next to none."""
     import numpy as np
 
-    if mark.ellipse is None:
-        return _MIN_HALF_AXIS * np.eye(2)
+    if mark.ellipse is None or not mark.located:
+        return 1e-3 * _MIN_HALF_AXIS * np.eye(2)
     u, phi, _ = side.locate(mark.point)
     points, _ = side.place(np.array([u, u + 1e-4, u]), np.array([phi, phi, phi + 1e-4]))
     ways = (points[1:] - points[0]) / np.linalg.norm(points[1:] - points[0], axis=1)[:, None]

@@ -6,7 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from html import escape
 from itertools import cycle
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from .history import CHANNELS, Series
 from .run_course import RunCourse
@@ -14,69 +14,26 @@ from .run_course import RunCourse
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
 
-__all__ = ["trace_drawings", "traces"]
+__all__ = ["trace_drawings"]
 
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
+_Line = tuple[str, Series, int, float]  # name, values, which of them, and the host time that is 0 [s]
 
 
-class _Traces(NamedTuple):
-    """Values over time.
-
-    Attributes:
-        names: of the values.
-        times: on the page's clock [s], shape (n,).
-        values: one row for each name, NaN where there is none, shape (k, n).
-    """
-
-    names: tuple[str, ...]
-    times: Floats
-    values: Floats
-
-
-def _trace_names(courses: Sequence[RunCourse]) -> list[str]:
-    """Return what can be drawn of runs."""
-    sensors = [sheet.name for sheet in courses[0].stage.sheets]
-    arm = [_SPEEDS] if any(course.history.speeds.times for course in courses) else []
-    force = [_FORCE] if any(course.history.forces.times for course in courses) else []
-    return [_LEVELS, *force, *arm, *(f"channels of {name}" for name in sensors)]
-
-
-def traces(courses: Sequence[RunCourse], what: str, since: float, until: float) -> _Traces:
-    """Return traces of runs.
-
-    Args:
-        courses: the runs.
-        what: one of ``_trace_names``.
-        since: from when on, on the page's clock [s].
-        until: until when.
-    """
-    import numpy as np
-
-    edges = np.linspace(since, max(until, since + 1e-6), _BIN_COUNT + 1)
-    times = np.repeat(0.5 * (edges[:-1] + edges[1:]), 2)
-    names: list[str] = []
-    rows: list[Floats] = []
+def _plots(courses: Sequence[RunCourse]) -> dict[str, list[_Line]]:
+    """Return what can be drawn of runs, each with its lines."""
+    plots: dict[str, list[_Line]] = {}
     for number, course in enumerate(courses, 1):
-        before = f"run {number}: " if len(courses) > 1 else ""
-        for name, series, column in _columns(course, what):
-            names.append(before + name)
-            rows.append(_envelope(series, column, course.zero, edges))
-    names, rows = names[:_MAX_LINES], rows[:_MAX_LINES]
-    return _Traces(tuple(names), times, np.array(rows).reshape(len(rows), len(times)))
-
-
-def _columns(course: RunCourse, what: str) -> list[tuple[str, Series, int]]:
-    history = course.history
-    if what == _LEVELS:
-        return [(name, series, 0) for name, series in history.levels.items()]
-    if what == _FORCE:
-        return [("force", history.forces, 0)]
-    if what == _SPEEDS:
-        return [(f"joint {joint + 1}", history.speeds, joint) for joint in range(6)]
-    sensor = what.removeprefix("channels of ")
-    found = history.channels.get(sensor, Series())
-    return [(channel, found, column) for column, channel in enumerate(CHANNELS)]
+        history, whose = course.history, f"run {number}: " if len(courses) > 1 else ""
+        lines = [(_LEVELS, name, series, 0) for name, series in history.levels.items()]
+        lines += [(_FORCE, "force", history.forces, 0)] if history.forces.times else []
+        lines += [(_SPEEDS, f"joint {k + 1}", history.speeds, k) for k in range(6) if history.speeds.times]
+        for sensor, series in history.channels.items():
+            lines += [(f"channels of {sensor}", channel, series, k) for k, channel in enumerate(CHANNELS)]
+        for what, name, series, column in lines:
+            plots.setdefault(what, []).append((whose + name, series, column, course.zero))
+    return plots
 
 
 def _envelope(series: Series, column: int, zero: float, edges: Floats) -> Floats:
@@ -102,11 +59,11 @@ _LINE_DASHES = ("", "6 3", "2 2", "8 2 2 2")  # a shape as well
 _MAX_LINES = 12  # of one plot
 
 
-def _value_range(what: str, found: _Traces) -> tuple[float, float]:
+def _value_range(what: str, rows: Floats) -> tuple[float, float]:
     """Return from where to where values are drawn: levels and forces from 0, speeds as far below 0 as above."""
     import numpy as np
 
-    known = found.values[np.isfinite(found.values)]
+    known = rows[np.isfinite(rows)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if what == _LEVELS:
         return 0.0, 1.0
@@ -129,33 +86,34 @@ def trace_drawings(courses: Sequence[RunCourse], since: float, until: float, liv
         until: until when.
         live: touch levels alone, up to now.
     """
-    names = _trace_names(courses)[: 1 if live else None]
-    options = "".join(f'<option value="{number}">{escape(name)}</option>' for number, name in enumerate(names))
-    choice = f"<b>{escape(names[0])}</b>" if live else f"<select>{options}</select>"
+    plots = list(_plots(courses).items())[: 1 if live else None]
+    options = "".join(f'<option value="{number}">{escape(name)}</option>' for number, (name, _) in enumerate(plots))
+    choice = f"<b>{escape(plots[0][0])}</b>" if live else f"<select>{options}</select>"
     ends = (f"{since - until:.0f} s", "now") if live else (f"{since:.3f} s", f"{until:.3f} s")
-    drawings = [_drawing(name, traces(courses, name, since, until), ends) for name in names]
-    hidden = ["", *[" hidden"] * (len(names) - 1)]
+    drawings = [_drawing(name, lines[:_MAX_LINES], since, until, ends) for name, lines in plots]
+    hidden = ["", *[" hidden"] * (len(plots) - 1)]
     drawn = "".join(f'<div class="coneskin-trace"{a}>{b}</div>' for a, b in zip(hidden, drawings, strict=True))
     return f'<div id="coneskin-traces"><label>traces {choice}</label>{drawn}</div>'
 
 
-def _drawing(what: str, found: _Traces, ends: tuple[str, str]) -> str:
-    low, high = _value_range(what, found)
-    since, until = float(found.times[0]), float(found.times[-1])
-    x = (found.times - since) / max(until - since, 1e-9) * _WIDTH
-    lines, words = [], []
-    for name, values, colour, dash in zip(
-        found.names, found.values, cycle(_LINE_COLOURS), cycle(_LINE_DASHES), strict=False
-    ):
+def _drawing(what: str, lines: Sequence[_Line], since: float, until: float, ends: tuple[str, str]) -> str:
+    import numpy as np
+
+    edges = np.linspace(since, max(until, since + 1e-6), _BIN_COUNT + 1)
+    rows = np.array([_envelope(series, column, zero, edges) for _, series, column, zero in lines])
+    low, high = _value_range(what, rows)
+    x = np.repeat(np.arange(_BIN_COUNT) + 0.5, 2) * (_WIDTH / _BIN_COUNT)
+    paths, words = [], []
+    for (name, *_), values, colour, dash in zip(lines, rows, cycle(_LINE_COLOURS), cycle(_LINE_DASHES), strict=False):
         course = _course(x, (high - values) / (high - low) * _HEIGHT)
         look = f'fill="none" stroke="{colour}" stroke-width="1.5" vector-effect="non-scaling-stroke"'
-        lines.append(f'<path d="{course}" data-name="{escape(name)}" stroke-dasharray="{dash}" {look}/>')
+        paths.append(f'<path d="{course}" data-name="{escape(name)}" stroke-dasharray="{dash}" {look}/>')
         words.append(f'<span style="color:{colour}">&#9644;</span> {escape(name)}')
     return (
         f'<div class="coneskin-plot" data-since="{since}" data-until="{until}" data-low="{low}" data-high="{high}" '
         f'data-width="{_WIDTH}" data-height="{_HEIGHT}">'
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" preserveAspectRatio="none" style="height:{_HEIGHT:g}px">'
-        f'{"".join(lines)}</svg><span style="top:0">{high:.3g}</span><span style="bottom:0">{low:.3g}</span>'
+        f'{"".join(paths)}</svg><span style="top:0">{high:.3g}</span><span style="bottom:0">{low:.3g}</span>'
         '<div class="coneskin-cursor"></div><div class="coneskin-pointer" hidden></div></div>'
         f'<div class="coneskin-read"></div><div class="coneskin-ends"><span>{ends[0]}</span>'
         f"<span>{', '.join(words)}</span><span>{ends[1]}</span></div>"

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_run"]
+__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_header", "read_run"]
 
 
 MOST_DIFFERENCES = 5  #: that a replay describes
@@ -415,6 +415,30 @@ class Run:
         return [describe(event, self.start) for event in (self.events if events is None else events)]
 
 
+def read_header(block: Block | None, path: Path) -> dict[str, Any]:
+    """Return the header that a block holds.
+
+    Args:
+        block: the first of a recording; None where there is none.
+        path: of the recording.
+
+    Raises:
+        RecordingError: there is none, or this version of coneskin cannot read it.
+    """
+    if block is None:
+        raise RecordingError(f"{path} has no header: the run ended before it began")
+    try:
+        header: dict[str, Any] = read_json(block.payload)
+        if wrong := [key for key, kind in _HEADER_TYPES.items() if not isinstance(header[key], kind)]:
+            raise ValueError(f"{', '.join(wrong)} of another kind")
+        if not is_time(header["clocks"]["monotonic"]):
+            raise ValueError("clocks.monotonic is no time in seconds")
+        Commissioning.from_message(header.get("commissioning"))
+    except (ValueError, TypeError, KeyError) as exc:
+        raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
+    return header
+
+
 def read_run(path: Path | str, progress: Progress = silent) -> Run:
     """Read a recorded run.
 
@@ -434,17 +458,7 @@ def read_run(path: Path | str, progress: Progress = silent) -> Run:
     first = next(iter(recording), None)
     if first is None or first.kind != BlockKind.HEADER:
         first = next((block for block in recording.copies if block.kind == BlockKind.HEADER), None)
-    if first is None:
-        raise RecordingError(f"{path} has no header: the run ended before it began")
-    try:
-        header = read_json(first.payload)
-        if wrong := [key for key, kind in _HEADER_TYPES.items() if not isinstance(header[key], kind)]:
-            raise ValueError(f"{', '.join(wrong)} of another kind")
-        if not is_time(header["clocks"]["monotonic"]):
-            raise ValueError("clocks.monotonic is no time in seconds")
-        Commissioning.from_message(header.get("commissioning"))
-    except (ValueError, TypeError, KeyError) as exc:
-        raise RecordingError(f"{path} has a header that this coneskin cannot read: {exc}") from exc
+    header = read_header(first, path)
     blocks = replace(recording, hidden=recording.hidden | {BlockKind.HEADER})
     run = Run(header, blocks, recording.defects, recording.copies)
     return replace(run, defects=tuple(sorted((*_left_out(run.events), *run.defects), key=lambda found: found.since)))

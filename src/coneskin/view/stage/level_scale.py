@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .sheet_surface import SheetSurface
 
-__all__ = ["SHEET_COLOURS", "force_words", "gradient", "level_bars", "level_colour", "level_words"]
+__all__ = ["SHEET_COLOURS", "gradient", "level_bars", "level_colour", "level_words"]
 
 _COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
 #: quiet, touched and firm: from dark to bright, each with a contrast of 3 and more to the one before, to any eye
@@ -63,13 +63,8 @@ def level_bars(
     parts = [f"<b>{escape(title)}</b>"] if title else []
     parts += [_bar(sheet, levels[sheet.name]) for sheet in sheets]
     if force is not None:
-        parts.append(f'<div class="coneskin-force">force of the contact, in physics: <b>{force_words(force)}</b></div>')
+        parts.append(f'<div class="coneskin-force">force of the contact, in physics: <b>{force:.1f} N</b></div>')
     return f'<div id="coneskin-levels">{"".join(parts)}</div>'
-
-
-def force_words(force: float) -> str:
-    """Return a force [N] for people."""
-    return f"{force:.1f} N"
 
 
 def _bar(sheet: SheetSurface, level: float) -> str:

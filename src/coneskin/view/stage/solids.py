@@ -221,12 +221,13 @@ def body_solids(bodies: Sequence[BodyScene]) -> list[Solid]:
 
 
 def _solid(name: str, body: BodyScene, place: Vector) -> Solid:
+    turned = Pose.trusted(along(body.axis).rotation, place)
     if body.kind == "wall":
         corners, faces = _plate(body.radius)
-        return Solid(name, 0, _body_pose(place, body.axis).apply_all(corners), faces, _BODY_COLOUR, closed=True)
+        return Solid(name, 0, turned.apply_all(corners), faces, _BODY_COLOUR, closed=True)
     if body.kind == "post":
         half = 0.5 * body.length
-        return barrel(name, 0, _body_pose(place, body.axis), body.radius, (-half, half), _BODY_COLOUR)
+        return barrel(name, 0, turned, body.radius, (-half, half), _BODY_COLOUR)
     turns = [math.pi * (k / _ARC_COUNT - 0.5) for k in range(_ARC_COUNT + 1)]
     profile = [(max(0.0, body.radius * math.cos(turn)), body.radius * math.sin(turn)) for turn in turns]
     vertices, faces = revolve(profile, 32)
@@ -240,8 +241,3 @@ def _plate(half: float) -> tuple[Floats, Ints]:
     corners = np.array([(x, y, z) for z in (-_WALL_THICKNESS, 0.0) for y in (-half, half) for x in (-half, half)])
     squares = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     return corners, np.array([face for a, b, c, d in squares for face in ((a, b, c), (a, c, d))])
-
-
-def _body_pose(place: Vector, axis: Vector) -> Pose:
-    turned = along(axis)
-    return Pose.trusted(turned.rotation, place)

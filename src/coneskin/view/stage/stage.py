@@ -125,18 +125,6 @@ class Stage:
             return sum(map(abs, self.model.a)) + sum(map(abs, self.model.d))
         return max((float(abs(sheet.vertices).max()) for sheet in self.sheets), default=1.0)
 
-    def same_shape(self, other: Stage) -> bool:
-        """Tell whether another stage is drawn with the same nodes."""
-        here: list[Solid | SheetSurface] = [*self.solids, *self.bodies, *self.sheets]
-        there: list[Solid | SheetSurface] = [*other.solids, *other.bodies, *other.sheets]
-        if self.model != other.model or len(here) != len(there) or len(self.sheets) != len(other.sheets):
-            return False
-        return all(
-            (a.name, a.link, a.vertices.shape) == (b.name, b.link, b.vertices.shape)
-            and bool((a.vertices == b.vertices).all())
-            for a, b in zip(here, there, strict=True)
-        )
-
     def poses(self, q: Sequence[float] | None) -> dict[int, Pose]:
         """Return the pose in the base frame of each link's frame at joint positions q [rad]; None: at rest."""
         if self.model is None:
