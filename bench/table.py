@@ -43,6 +43,9 @@ BENCHES = {
     "deceleration": Bench(
         "bench.reaction.deceleration", "Friction, which helps, and the brakes and limits of a real controller."
     ),
+    "stopping-times": Bench(
+        "bench.reaction.stopping_times", "Brakes: the law of the simulation is fitted to UR's tables."
+    ),
     "kinematics": Bench("bench.reaction.kinematics", "The accuracy of a real arm's geometry."),
     "speed-limit": Bench("bench.reaction.speed_limit", "How soon a real controller's slider acts."),
     # faults, collisions, and the model of a contact

@@ -14,7 +14,7 @@ Sources of the table:
     cylinders of the published mass, as in that file. The tensors that it gives for the UR30 are the UR16e's, digit for
     digit, with which an upper arm of 28.5 kg would turn as one of 10; so shoulder and wrists have the UR20's tensors,
     whose masses are the same, and upper arm and forearm the UR20's, scaled by mass and by length squared (ours).
-    The UR7e has the UR5e's.
+    The UR7e has the UR5e's, the UR12e the UR10e's. UR15 and UR18 are from commits 2cb0bf1 and 6ffee81.
     Torques: Universal Robots, "Max. joint torques", as collected in ``joint_limits.yaml`` there.
     Rotors: not published. 0.1 kg m^2 at every joint, as MuJoCo Menagerie's UR5e has it (``universal_robots_ur5e``,
     armature), scaled with the joint's highest torque over 150 N m, because larger joints have larger motors (assumed).
@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
@@ -34,7 +34,7 @@ from .model import ArmModel, Joints
 from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
 
-__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "mass_matrix"]
+__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "loaded", "mass_matrix"]
 
 #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 GRAVITY = 9.82
@@ -158,6 +158,30 @@ def _swept(rate: Vector, spin: Vector, arm: Vector) -> Vector:
     return added(cross(rate, arm), cross(spin, cross(spin, arm)))
 
 
+def loaded(inertia: ArmInertia, mass: float, centre: Sequence[float]) -> ArmInertia:
+    """Return the inertia of an arm that carries a payload, taken as a point.
+
+    Args:
+        inertia: of the bare arm.
+        mass: of the payload [kg].
+        centre: its centre of mass in the flange's frame [m].
+    """
+    if not mass > 0.0:
+        return inertia
+    last = inertia.links[-1]
+    both = last.mass + mass
+    x, y, z = centre
+    share, arm = mass / both, minus((x, y, z), last.centre)
+    part, square = last.mass * share, dot(arm, arm)
+    rows = [
+        tuple(have + part * ((square if i == j else 0.0) - arm[i] * arm[j]) for j, have in enumerate(row))
+        for i, row in enumerate(last.tensor)
+    ]
+    tensor: Tensor = (rows[0], rows[1], rows[2])  # type: ignore[assignment]
+    link = LinkInertia(both, added(last.centre, scaled(arm, share)), tensor)
+    return replace(inertia, links=(*inertia.links[:-1], link))
+
+
 _ROTOR_PER_TORQUE = 0.1 / 150.0  # kg m^2 of reflected inertia for each N m of highest torque
 
 #: mass [kg]; centre x, y, z [m]; tensor xx, xy, xz, yy, yz, zz [kg m^2], about the centre, in the DH frame
@@ -181,6 +205,23 @@ _UR5E_LINKS: tuple[_Row, ...] = (
     (1.37, (0.0, -0.0018, 0.01634), (0.00165491, -2.82e-6, -4.38e-6, 0.00135962, 0.00010157, 0.00126279)),
     (1.3, (0.0, 0.0018, 0.01634), (0.00135617, -2.74e-6, 4.44e-6, 0.00127827, -5.048e-5, 0.00096614)),
     (0.365, (0.0, 0.0, -0.001159), (0.00018694, 6e-8, -1.7e-7, 0.00018908, -9.2e-7, 0.00025756)),
+)
+_UR10E_LINKS: tuple[_Row, ...] = (
+    (7.369, (0.021, 0.0, 0.027), (0.03408, 0.00002, -0.00425, 0.03529, 0.00008, 0.02156)),
+    (13.051, (0.38, 0.0, 0.158), (0.02814, 0.00005, -0.01561, 0.77068, 0.00002, 0.76943)),
+    (3.989, (0.24, 0.0, 0.068), (0.01014, 0.00008, 0.00916, 0.30928, 0.0, 0.30646)),
+    (2.1, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+    (1.98, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
+    (0.615, (0.0, 0.0, -0.026), (0.0004, 0.0, 0.0, 0.00041, 0.0, 0.00034)),
+)
+#: of UR15 and UR18, which share them
+_UR15_SHOULDER: _Row = (
+    9.9883, (0.000024, -0.033309, 0.025304), (0.051334, 0.000025, -0.000016, 0.047702, 0.008805, 0.034263)
+)  # fmt: skip
+_UR15_WRISTS: tuple[_Row, ...] = (
+    (2.089, (0.000025, -0.019695, 0.016413), (0.004339, 0.000019, 0.000001, 0.002548, 0.000706, 0.003912)),
+    (2.0869, (0.000025, 0.01996, 0.015886), (0.004288, 0.000017, -0.000003, 0.002566, -0.000716, 0.003927)),
+    (1.0666, (-0.000018, -0.000112, -0.053397), (0.001406, -0.000003, 0.00001, 0.001404, -0.000024, 0.001002)),
 )
 _LINK_TABLE: dict[str, tuple[_Row, ...]] = {
     "UR3": (
@@ -217,13 +258,13 @@ _LINK_TABLE: dict[str, tuple[_Row, ...]] = {
     ),
     "UR5e": _UR5E_LINKS,
     "UR7e": _UR5E_LINKS,
-    "UR10e": (
-        (7.369, (0.021, 0.0, 0.027), (0.03408, 0.00002, -0.00425, 0.03529, 0.00008, 0.02156)),
-        (13.051, (0.38, 0.0, 0.158), (0.02814, 0.00005, -0.01561, 0.77068, 0.00002, 0.76943)),
-        (3.989, (0.24, 0.0, 0.068), (0.01014, 0.00008, 0.00916, 0.30928, 0.0, 0.30646)),
-        (2.1, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
-        (1.98, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
-        (0.615, (0.0, 0.0, -0.026), (0.0004, 0.0, 0.0, 0.00041, 0.0, 0.00034)),
+    "UR10e": _UR10E_LINKS,
+    "UR12e": _UR10E_LINKS,
+    "UR15": (
+        _UR15_SHOULDER,
+        (14.9255, (0.419009, -0.000083, 0.192787), (0.048202, 0.000232, -0.032135, 1.188499, -0.000017, 1.182771)),
+        (6.1015, (0.305471, 0.000019, 0.070552), (0.018481, -0.000005, 0.013601, 0.303502, 0.000003, 0.296843)),
+        *_UR15_WRISTS,
     ),
     "UR16e": (
         (7.369, (0.0, -0.016, 0.03), (0.03351, 0.00002, -0.00001, 0.03374, 0.00374, 0.021)),
@@ -232,6 +273,12 @@ _LINK_TABLE: dict[str, tuple[_Row, ...]] = {
         (2.18, (0.0, -0.009, 0.011), (0.00609, -0.00001, 0.0, 0.00245, 0.00083, 0.00579)),
         (2.033, (0.0, 0.018, 0.012), (0.00389, -0.00001, 0.0, 0.00219, -0.00045, 0.00363)),
         (0.907, (0.0, 0.0, -0.044), (0.00117, 0.0, 0.0, 0.00118, 0.0, 0.00084)),
+    ),
+    "UR18": (
+        _UR15_SHOULDER,
+        (14.2009, (0.308664, -0.000088, 0.190204), (0.045094, 0.000179, -0.024705, 0.630805, -0.00002, 0.625724)),
+        (5.52, (0.199652, 0.000021, 0.073101), (0.016891, 0.0, 0.009081, 0.129732, 0.000003, 0.123451)),
+        *_UR15_WRISTS,
     ),
     "UR20": (
         (16.343, (0.0, -0.061, 0.0062), (0.08866, -0.00011, -0.00011, 0.07632, 0.0072, 0.08418)),
@@ -265,6 +312,9 @@ _JOINT_TORQUES = {
     "UR5e": _torque(150.0, 150.0, 28.0),
     "UR7e": _torque(150.0, 150.0, 28.0),
     "UR10e": _torque(330.0, 150.0, 54.0),
+    "UR12e": _torque(330.0, 150.0, 54.0),
+    "UR15": _torque(433.0, 204.0, 70.0),
+    "UR18": _torque(433.0, 204.0, 70.0),
     "UR16e": _torque(330.0, 150.0, 54.0),
     "UR20": _torque(738.0, 433.0, 107.0),
     "UR30": _torque(738.0, 433.0, 107.0),

@@ -2,10 +2,12 @@
 
 Sources:
     Lengths: Universal Robots support article "DH Parameters for calculations of kinematics and dynamics" and
-    ``default_kinematics.yaml`` of Universal_Robots_ROS2_Description, which agree digit for digit. The UR7e is a
-    UR5e of higher payload: the same geometry and masses. The printed CB3 service manual has other numbers for old
-    series (UR5 series 1 and 2, and UR10 rounded): for those, and for any work below a few millimetres, use
-    ``ArmModel.calibrated``.
+    ``default_kinematics.yaml`` of Universal_Robots_ROS2_Description, which agree digit for digit. The UR7e is a UR5e of
+    higher payload, the UR12e a UR10e: the same geometry and masses. Lengths of UR15 and UR18, and the UR15's limits:
+    ``default_kinematics.yaml`` and ``joint_limits.yaml`` of ros-industrial/universal_robot (commits 499e728, 34b1371).
+    The UR8 Long is missing: no source of its joints' speeds and torques was found. The printed CB3 service manual has
+    other numbers for old series (UR5 series 1 and 2, and UR10 rounded): for those, and for any work below a few
+    millimetres, use ``ArmModel.calibrated``.
     Limits and speeds: user manuals as collected in ``joint_limits.yaml`` there. The elbow's 180 deg is from that file
     too: the controller accepts 360 deg, but the forearm meets the upper arm before. Wrist 3 of UR3 and UR3e turns
     without end. Universal Robots publishes no joint accelerations.
@@ -47,6 +49,7 @@ def _arm(name: str, lengths: tuple[float, ...], speeds: Joints, wrist_3_limit: f
 _SMALL_SPEEDS = _deg(180, 180, 180, 360, 360, 360)
 _MEDIUM_SPEEDS = _deg(180, 180, 180, 180, 180, 180)
 _LARGE_SPEEDS = _deg(120, 120, 180, 180, 180, 180)
+_FAST_SPEEDS = _deg(180, 180, 240, 300, 300, 300)
 _HEAVY_SPEEDS = _deg(120, 120, 150, 210, 210, 210)
 
 #: all arms of the maker
@@ -58,7 +61,10 @@ UR_MODELS = (  # d1, a2, a3, d4, d5, d6 [m]
     _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
     _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
     _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+    _arm("UR12e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+    _arm("UR15", (0.2186, -0.6475, -0.5164, 0.1824, 0.1361, 0.1434), _FAST_SPEEDS),
     _arm("UR16e", (0.1807, -0.4784, -0.36, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
+    _arm("UR18", (0.2186, -0.475, -0.3389, 0.1824, 0.1361, 0.1434), _FAST_SPEEDS),
     _arm("UR20", (0.2363, -0.8620, -0.7287, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
     _arm("UR30", (0.2363, -0.6370, -0.5037, 0.2010, 0.1593, 0.1543), _HEAVY_SPEEDS),
 )

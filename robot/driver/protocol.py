@@ -176,8 +176,8 @@ class ArmDriver(Protocol):
     def setpoint_writer(self, host: str) -> SetpointWriter:
         """Return a reader of states that also writes setpoints, to be opened in a ``with``."""
 
-    def speed_slider(self, host: str) -> SpeedSlider:
-        """Return the speed slider, to be opened in a ``with``."""
+    def speed_slider(self, host: str, *, claim: bool = True) -> SpeedSlider:
+        """Return the speed slider, to be opened in a ``with``; where not claimed, it is taken by the first ``set``."""
 
     def heartbeat_writer(self, host: str) -> HeartbeatWriter:
         """Return the writer of the guard's heartbeat, to be opened in a ``with``."""

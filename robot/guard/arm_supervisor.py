@@ -126,6 +126,11 @@ class ArmSupervisor:
         if self.heartbeat is not None and (blocker := self.heartbeat.blocker()):
             blockers.append(blocker)
         state = self.state
+        if self.speed_reduction.halted and state is not None and state.program_running:
+            blockers.append(
+                "a stop has put the speed slider to 0 and a program runs: end the program first, because a slider that "
+                "is raised under a program gives a protective stop"
+            )
         if state is None or self.state_age.silent(now):
             return [*blockers, "the controller is silent"]
         if trouble := self.state_age.trouble(now):
@@ -151,6 +156,7 @@ class ArmSupervisor:
 
     def release(self, number: int, out: Outputs) -> None:
         """Ask the process that moves or holds the arm to let the program move it, and to acknowledge this number."""
+        self.speed_reduction.release(out)  # before a program runs that it would move at once
         out.append(Release(number))
 
     def withdraw(self, out: Outputs) -> None:
@@ -158,14 +164,13 @@ class ArmSupervisor:
         if self.internal_control:
             out.append(StopProgram(self._rules.default.deceleration))
 
-    def activate(self, out: Outputs) -> None:
+    def activate(self) -> None:
         """React from now on. The program may move the arm."""
         self.supervision, _ = transition(self.supervision, Cue.ACTIVATED)
         self._reaction = self._rules.default
         self._stop.watch.forget()
         if self._speed_limit is not None:
             self._speed_limit.forget()
-        self.speed_reduction.release(out)
 
     def stop_for_touch(self, link: int, level: float, out: Outputs) -> None:
         """Send the stop for a touch that begins, before anything else is known of it. ``touch`` has to come next.

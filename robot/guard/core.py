@@ -476,7 +476,7 @@ class GuardCore:
         if self._arm is None:
             self._phase = Phase.ACTIVE
         else:
-            self._arm.activate(out)
+            self._arm.activate()
         self._folding.flush(now, out)
         emit(out, EventName.ACTIVATED, now, request=self._activation.end())
         if self._not_commissioned:

@@ -10,6 +10,7 @@ import signal
 import socket
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from coneskin.core.channel import Channel
@@ -18,12 +19,13 @@ from coneskin.core.files import read_file
 from coneskin.core.help_text import HelpFormatter
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
+from coneskin.robot.ur.measured import read_measured
 
 from .compiler import SIMULATOR_MEMORY, bounded_memory
 from .machine.controller import Controller
-from .machine.states import DEFAULT_MODEL, START_Q, Options, Version
+from .machine.states import DEFAULT_MODEL, PORTS, START_Q, Options, Version
 from .motion.remote_plant import RemotePlant
-from .server import PORTS, Server, is_loopback
+from .server import Server, is_loopback
 
 __all__ = ["EXAMPLE", "add_arguments", "main", "run"]
 
@@ -80,7 +82,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         help="where a loaded program with the node External Control asks for its script (%(default)s)",
     )
-    add("--local-control", action="store_true", help="start in local control: no program and no command is taken")
+    add(
+        "--control",
+        choices=("local", "remote"),
+        default="remote",
+        help="control at the start; in local control no program and no command is taken (%(default)s)",
+    )
+    add(
+        "--closed",
+        nargs="+",
+        default=(),
+        choices=tuple(PORTS),
+        metavar="SERVICE",
+        help=f"services that are switched off: {', '.join(PORTS)}",
+    )
+    add(
+        "--measured",
+        type=Path,
+        metavar="FILE",
+        help="behave as the controller that scripts/measure_controller.py has seen",
+    )
+    add("--fieldbus", action="store_true", help="a fieldbus adapter holds the lower half of the input registers")
     add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
     add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add(
@@ -117,8 +139,18 @@ def _serve(args: argparse.Namespace) -> int:
         program=_read(args.program) if args.program else "",
         programs=_folder(args.programs) if args.programs else None,
         external_control=_address(args.external_control),
-        remote_control=not args.local_control,
+        remote_control=args.control == "remote",
+        closed=frozenset(args.closed),
+        fieldbus=args.fieldbus,
     )
+    if args.measured:
+        measured = read_measured(args.measured)
+        options = replace(
+            options,
+            start_delay=max(0.0, measured.start[0]),
+            watchdog_delay=max(0.0, measured.watchdog[0]),
+            deceleration=measured.deceleration or options.deceleration,
+        )
     parent = os.getppid()
     log = None
     try:
@@ -146,7 +178,7 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
         "host": args.host,
         "model": controller.arm.model.name,
         "version": args.version,
-        "ports": PORTS,
+        "ports": controller.options.services,
         "fault_address": server.fault_address,
         "pid": os.getpid(),
     }
@@ -169,8 +201,9 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
         print(json.dumps(facts), flush=True)
     else:
         print(
-            f"simulated {facts['model']} (PolyScope {args.version}) ready on {args.host}: RTDE {PORTS['RTDE']}, "
-            f"dashboard {PORTS['dashboard']}, URScript {PORTS['primary']}-{PORTS['realtime']}; Ctrl-C stops it",
+            f"simulated {facts['model']} (PolyScope {args.version}) ready on {args.host}: "
+            + ", ".join(f"{name} {port}" for name, port in controller.options.services.items())
+            + "; Ctrl-C stops it",
             flush=True,
         )
 

@@ -24,8 +24,7 @@ from typing import Any
 from coneskin.core.child_process import OwnedProcess
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
-from .machine.states import DEFAULT_MODEL
-from .server import PORTS
+from .machine.states import DEFAULT_MODEL, PORTS
 
 __all__ = ["SimulatedController", "free_host"]
 
@@ -74,6 +73,7 @@ class SimulatedController(OwnedProcess):
         plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
             follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].
+        options: further words of the command line, such as ("--fieldbus",).
 
     Raises:
         RobotTimeout: on entry, it is not ready in time.
@@ -99,6 +99,7 @@ class SimulatedController(OwnedProcess):
         remote_control: bool = True,
         plant: socket.socket | None = None,
         ready_within: float = 15.0,
+        options: Sequence[str] = (),
     ) -> None:
         self.host = host
         self.log = log
@@ -119,7 +120,8 @@ class SimulatedController(OwnedProcess):
         if programs is not None:
             self._arguments += ["--programs", str(programs)]
         if not remote_control:
-            self._arguments.append("--local-control")
+            self._arguments += ["--control", "local"]
+        self._arguments += options
 
     def __enter__(self) -> SimulatedController:
         command = [sys.executable, "-m", "coneskin.robot.sim.command", "--json", "--faults", "--exit-with-parent"]

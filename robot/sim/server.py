@@ -22,6 +22,7 @@ from coneskin.core.errors import RobotRefused
 
 from .compiler import Compiler
 from .machine.controller import Controller
+from .machine.states import PORTS
 from .motion.arm import CYCLE
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
 from .ports.client_interface import Publisher, ScriptPort
@@ -30,7 +31,7 @@ from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
-__all__ = ["PORTS", "Server", "is_loopback"]
+__all__ = ["Server", "is_loopback"]
 
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
@@ -122,8 +123,6 @@ def _each(action: Callable[[str], int | None], names: tuple[str, ...]) -> int | 
 
 
 _SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
-#: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
-PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
 _LOOPBACK_PREFIX = "127."  # of every address that no other computer can reach
 _ACCEPT_BACKLOG = 16  # connections that wait to be accepted
@@ -175,7 +174,8 @@ class Server:
     def __enter__(self) -> Server:
         with ExitStack() as undo:
             undo.callback(self.close)
-            for name, port in PORTS.items():
+            address = (self.host, 0)
+            for name, port in self.controller.options.services.items():
                 address = self._listen(name, self.host, port)
             self.local = is_loopback(address[0])
             self.controller.beyond = not self.local
@@ -230,7 +230,7 @@ class Server:
 
     def cut(self, name: str) -> None:
         """Let the network drop every packet of a service: nothing is read, sent or accepted, nothing is closed."""
-        if name in self._cut:
+        if name in self._cut or name not in self._listeners:
             return
         self._cut.add(name)
         listener = self._listeners[name]
@@ -269,7 +269,7 @@ class Server:
             self._poll(0.0)
             if wait < -_MAX_LATENESS:
                 before, due = due, time.monotonic()
-                self.controller.frozen += due - before  # or its states would look ever later than they are
+                self.controller.hold_up(due - before)  # without it its states would look ever later than they are
             while due <= time.monotonic():
                 self._cycle()
                 due += CYCLE

@@ -55,10 +55,10 @@ class _UrDriver:
 
         return RegisterWriter(host)
 
-    def speed_slider(self, host: str) -> RtdeSpeedSlider:
+    def speed_slider(self, host: str, *, claim: bool = True) -> RtdeSpeedSlider:
         from .input_writers import RtdeSpeedSlider
 
-        return RtdeSpeedSlider(host)
+        return RtdeSpeedSlider(host, claim=claim)
 
     def heartbeat_writer(self, host: str) -> HeartbeatRegisters:
         from .input_writers import HeartbeatRegisters

@@ -1,4 +1,6 @@
-"""Examination of a UR controller: ports, model, state, registers, slider, latency. It moves nothing and writes nothing.
+"""Examination of a UR controller: ports, model, state, registers, slider, latency, stops.
+
+It moves nothing; a test program of one line writes an output register.
 
 Registers are only asked for and given back: RTDE gives each to one client, and what another one holds is named here
 rather than at the start of the guard. An EtherNet/IP or PROFINET adapter that is enabled on the controller holds the
@@ -24,13 +26,15 @@ from .model_check import check_model, read_pose
 from .rtde_codec import decode_state
 from .rtde_connection import PORT, RtdeConnection
 from .state_reader import StateReader
+from .stop_sockets import StopSockets, refuse_polyscope_x
 
 __all__ = ["examine"]
 
 _REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
 _DASHBOARD_PORT, _SCRIPT_PORT = 29999, 30003  # TCP ports
 _LISTEN_TIME = 1.0  # s of states
-_MAX_PERIOD, _MAX_GAP = 0.0025, 0.025  # s: the median between two states, and the longest; half of arm_silence_ms
+_MAX_LATENESS, _MAX_GAP = 1.25, 0.025  # times the control cycle, of the median between two states; s, of the longest
+_CB3 = 3  # major version of its software, which has a cycle of 8 ms and no local control
 _CONTROL_INPUTS = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
 _FREE_REMEDY = (
     "end the other program; or disable EtherNet/IP, PROFINET and MODBUS in the controller's Installation, Fieldbus"
@@ -46,8 +50,12 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
         scope: what the scene needs of it.
     """
     try:
-        with RtdeConnection(host, _REPLY_TIMEOUT):
-            found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers")]
+        with RtdeConnection(host, _REPLY_TIMEOUT) as connection:
+            major, minor = connection.ask_version()
+        found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers, software {major}.{minor}")]
+        refuse_polyscope_x(host, _REPLY_TIMEOUT)
+    except RobotRefused as exc:
+        return [*found, Finding("arm, dashboard", "bad", str(exc))]
     except ConeSkinError as exc:
         rest = ("model", "state", "registers", "latency", "dashboard")
         return [
@@ -55,9 +63,11 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
             *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
         ]
     found += _tried("arm, model", lambda: _model(arm, host))
-    found += _tried("arm, state", lambda: list(_state(host)))
-    found += _dashboard(host)
+    found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3 else 0.002)))
+    found += _dashboard(host, major)
     found += _port("arm, script port", host, _SCRIPT_PORT)
+    if not any(finding.verdict == "bad" for finding in found[-3:]):
+        found += _tried("arm, stops", lambda: _stops(host))
     found += list(_registers(host, scope))
     return found
 
@@ -80,8 +90,19 @@ def _model(arm: ArmModel, host: str) -> list[Finding]:
     return [Finding("arm, model", "ok", f"the flange is where a {arm.name} has it")]
 
 
-def _state(host: str) -> Iterator[Finding]:
-    """Look at the newest state, and at the times at which states come."""
+def _stops(host: str) -> list[Finding]:
+    """Prove the stop paths as a guard does at its start."""
+    start = time.monotonic()
+    with StopSockets(host, _REPLY_TIMEOUT):
+        return [
+            Finding(
+                "arm, stops", "ok", f"programs and commands are taken, in {1e3 * (time.monotonic() - start):.0f} ms"
+            )
+        ]
+
+
+def _state(host: str, cycle: float) -> Iterator[Finding]:
+    """Look at the newest state, and at the times at which states come, each control cycle [s]."""
     times: list[float] = []
     with StateReader(host, _REPLY_TIMEOUT) as reader:
         state = reader.wait(_REPLY_TIMEOUT)
@@ -101,13 +122,13 @@ def _state(host: str) -> Iterator[Finding]:
     steps = [b - a for a, b in pairwise(times)]
     if len(steps) < 20:
         value = f"{len(times)} states in {_LISTEN_TIME:g} s"
-        yield Finding("arm, latency", "bad", value, "500 a second", "a wired network")
+        yield Finding("arm, latency", "bad", value, f"{1.0 / cycle:g} a second", "a wired network")
         return
     middle, longest = statistics.median(steps), max(steps)
-    verdict: Verdict = "ok" if middle <= _MAX_PERIOD and longest <= _MAX_GAP else "warning"
+    verdict: Verdict = "ok" if middle <= _MAX_LATENESS * cycle and longest <= _MAX_GAP else "warning"
     remedy = "" if verdict == "ok" else "a cable of its own, no wireless network, a quieter computer"
     value = f"a state each {1e3 * middle:.2f} ms (median), the longest gap {1e3 * longest:.1f} ms"
-    yield Finding("arm, latency", verdict, value, f"{1e3 * _MAX_PERIOD:g} ms, {1e3 * _MAX_GAP:g} ms", remedy)
+    yield Finding("arm, latency", verdict, value, f"{1e3 * _MAX_LATENESS * cycle:g} ms, {1e3 * _MAX_GAP:g} ms", remedy)
 
 
 def _port(item: str, host: str, port: int) -> list[Finding]:
@@ -119,7 +140,7 @@ def _port(item: str, host: str, port: int) -> list[Finding]:
     return [Finding(item, "ok", f"{host}:{port} answers")]
 
 
-def _dashboard(host: str) -> list[Finding]:
+def _dashboard(host: str, major: int) -> list[Finding]:
     """Ask the dashboard for the version and whether the controller is in remote control."""
     item = "arm, dashboard"
     try:
@@ -136,6 +157,8 @@ def _dashboard(host: str) -> list[Finding]:
         return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
     version, remote = answers
     found = [Finding(item, "ok", version or "it answers")]
+    if major == _CB3:
+        return found
     if "true" in remote.lower():
         return [*found, Finding("arm, remote control", "ok", "it is in remote control")]
     remedy = "choose Remote Control at the top right of the pendant"

@@ -126,11 +126,14 @@ class _InputOwner(RtdeConnection):
         super().__enter__()
         try:
             self.ask_outputs(self._outputs, _OUTPUT_FREQUENCY)
-            self._recipe_in = self.ask_inputs(self._inputs)
+            self._recipe_in = self._ask_inputs()
         except RobotRefused as exc:
             raise RobotRefused(f"the guard cannot have {self._what} of {self.host}: {exc}") from exc
         self.start()
         return self
+
+    def _ask_inputs(self) -> rtde.Recipe:
+        return self.ask_inputs(self._inputs)
 
 
 _SLIDER_OUTPUTS = ("target_speed_fraction",)
@@ -153,13 +156,35 @@ def decode_fraction(payload: bytes) -> float:
 
 
 class RtdeSpeedSlider(_InputOwner):
-    """Connection that reads and sets the slider without waiting; its ``with`` raises as `_InputOwner` says."""
+    """Connection that reads and sets the slider without waiting; its ``with`` raises as `_InputOwner` says.
+
+    Args:
+        host: the controller.
+        timeout: as of `_InputOwner`.
+        claim: take the slider at once. Otherwise it is only looked whether it is free, and taken by the first ``set``;
+            a program may have it until then. It is free again once the connection is closed.
+    """
 
     _what, _outputs, _inputs = "the speed slider", _SLIDER_OUTPUTS, SLIDER_INPUTS
 
+    def __init__(self, host: str, timeout: float = 2.0, *, claim: bool = True) -> None:
+        super().__init__(host, timeout)
+        self._claimed = claim
+
+    def __enter__(self) -> Self:
+        if not self._claimed:
+            with RtdeSpeedSlider(self.host, self._timeout):
+                pass
+        return super().__enter__()
+
+    def _ask_inputs(self) -> rtde.Recipe:
+        return super()._ask_inputs() if self._claimed else rtde.Recipe(SLIDER_INPUTS, 1)  # the first of a connection
+
     def set(self, fraction: float) -> bool:
         """Set the slider to a fraction without waiting; return whether the system took the bytes."""
-        return self.send(self._recipe_in, (1, fraction))
+        if not self._claimed:  # the answer comes among the data, where nobody looks at it: the slider itself is read
+            self._claimed = self.send_bytes(rtde.pack_inputs_request(SLIDER_INPUTS))
+        return self._claimed and self.send(self._recipe_in, (1, fraction))
 
 
 def set_slider(host: str, fraction: float, timeout: float) -> bool:

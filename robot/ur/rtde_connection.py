@@ -6,6 +6,7 @@ Its users decide what is read and written: ``state_reader``, ``input_writers``, 
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from typing import Self
@@ -85,6 +86,16 @@ class RtdeConnection:
         """
         return self._recipe(rtde.pack_inputs_request(names), rtde.PacketKind.INPUTS, names)
 
+    def ask_version(self) -> tuple[int, int]:
+        """Return major and minor version of the controller's software.
+
+        Raises:
+            RobotConnectionError, RobotTimeout: as of ``ask_outputs``.
+        """
+        kind = rtde.PacketKind.CONTROLLER_VERSION
+        major, minor = struct.unpack_from(">2I", self._ask(rtde.pack(kind), kind).ljust(8, b"\0"))
+        return major, minor
+
     def start(self) -> None:
         """Let the data flow; from now on nothing waits."""
         if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
@@ -136,7 +147,10 @@ class RtdeConnection:
 
     def send(self, recipe: rtde.Recipe, values: Sequence[rtde.Value]) -> bool:
         """Send inputs without waiting; return whether the system took the bytes."""
-        data = rtde.pack(rtde.PacketKind.DATA, recipe.pack(values))
+        return self.send_bytes(rtde.pack(rtde.PacketKind.DATA, recipe.pack(values)))
+
+    def send_bytes(self, data: bytes) -> bool:
+        """Send a packet without waiting; return whether the system took the bytes."""
         try:
             return self._sock is not None and self._sock.send(data) == len(data)
         except OSError:

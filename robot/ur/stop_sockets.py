@@ -11,9 +11,11 @@ A secondary program runs beside the main one and no upload replaces it, so that 
 at once cannot keep the protective stop away. Whether a controller takes the call there is measured by
 scripts/measure_controller.py; where it does not, the program before it does the same as long as nobody replaces it.
 
-A controller in local control refuses the programs and the dashboard's stop, and closes nothing. So the dashboard is
-asked at the start, and again and again: "is in remote control". Software that does not know the question has no local
-control.
+A controller in local control refuses the programs and the dashboard's stop, and closes nothing; a connection that was
+opened meanwhile stays read-only after the switch (C210 on the primary interface). So both are proven at the start, by
+what moves nothing: a secondary program writes an output register, and the dashboard answers "is in remote control". It
+is asked again and again, and its refusal of a stop counts as an answer. Software that does not know the question has no
+local control. PolyScope X has no dashboard.
 
 Source: UR script manual, dashboard server manual; which of these stops which motion was measured in a simulation
 (docs/safety.md, "Stop paths").
@@ -22,12 +24,15 @@ Source: UR script manual, dashboard server manual; which of these stops which mo
 from __future__ import annotations
 
 import socket
+import time
 from contextlib import suppress
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import SetpointProgram, StopPath
 
-__all__ = ["StopSockets"]
+from .rtde_connection import RtdeConnection
+
+__all__ = ["StopSockets", "refuse_polyscope_x"]
 
 _REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
@@ -39,12 +44,34 @@ sec coneskin_protective():
   protective_stop()
 end
 """
+_PROOF_REGISTER = 47  # integer output register
+_PROOF_REPEAT = 0.25  # s after which the program is sent again: another guard may have written the register meanwhile
+_PROOF_FREQUENCY = 125.0  # Hz
+_ARM_RUNNING = 7  # value of robot_mode
 _QUESTION = b"is in remote control\n"
+_REFUSAL = b"command is not allowed"  # begins the dashboard's answer to a command in local control
 _LOCAL_CONTROL = (
     "is in local control: it refuses every stop by program or command. Choose Remote Control at the top right of the "
     "pendant, then start again"
 )
+_FIRST_X = 10  # major version of PolyScope X
 _STOP_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
+
+
+def refuse_polyscope_x(host: str, timeout: float) -> None:
+    """Refuse a controller with PolyScope X.
+
+    Raises:
+        RobotRefused: it has that.
+        RobotConnectionError, RobotTimeout: it does not say what it has.
+    """
+    with RtdeConnection(host, timeout) as connection:
+        major, minor = connection.ask_version()
+    if major >= _FIRST_X:
+        raise RobotRefused(
+            f"the controller {host} has PolyScope X ({major}.{minor}), which has no dashboard server to stop an arm "
+            "with: coneskin does not support it. It guards arms with PolyScope 3 and 5"
+        )
 
 
 class StopSockets:
@@ -56,7 +83,8 @@ class StopSockets:
 
     Raises:
         RobotConnectionError: on entering, where a port does not answer.
-        RobotRefused: on entering, where the controller is in local control.
+        RobotRefused: on entering, where the controller takes no stop: in local control, over read-only connections, or
+            with PolyScope X.
     """
 
     def __init__(self, host: str, timeout: float = 2.0) -> None:
@@ -67,9 +95,11 @@ class StopSockets:
 
     def __enter__(self) -> StopSockets:
         try:
+            refuse_polyscope_x(self.host, self._timeout)
             for name, port in _STOP_PORTS.items():
                 self._open_ones[name] = self._open(port)
             self._prove_remote(self._open_ones["command"])
+            self._prove_program()
         except BaseException:
             self.close()
             raise
@@ -119,7 +149,7 @@ class StopSockets:
         """Take what the dashboard has said; tell whether that is the answer of local control."""
         *lines, self._said = (self._said + data).split(b"\n")
         self._said = self._said[-_MAX_ANSWER:]
-        return any(line.strip().lower() == b"false" for line in lines)
+        return any(line.strip().lower() == b"false" or line.lower().startswith(_REFUSAL) for line in lines)
 
     def _prove_remote(self, sock: socket.socket) -> None:
         """Wait for the dashboard's answer: a connection alone proves no stop."""
@@ -140,6 +170,32 @@ class StopSockets:
             )
         if answers[1].lower() == b"false":
             raise RobotRefused(f"the controller {self.host} {_LOCAL_CONTROL}")
+
+    def _prove_program(self) -> None:
+        """Send a secondary program that writes a register, and see it written: it runs beside any other."""
+        text = f"sec coneskin_proof():\n  write_output_integer_register({_PROOF_REGISTER}, %d)\nend\n"
+        token, mode = time.monotonic_ns() & 0x7FFFFFFF, 0
+        end, due = time.monotonic() + self._timeout, 0.0
+        with RtdeConnection(self.host, self._timeout) as seen:
+            recipe = seen.ask_outputs((f"output_int_register_{_PROOF_REGISTER}", "robot_mode"), _PROOF_FREQUENCY)
+            seen.start()
+            while (now := time.monotonic()) < end:
+                if now >= due:
+                    due = now + _PROOF_REPEAT
+                    self.run(text % token)
+                found, mode = recipe.unpack(seen.wait_data(self._timeout))  # type: ignore[assignment]
+                if found == token:
+                    return
+        remedy = (
+            "its script port is read-only (C210): the controller was in local control when it was opened, or another "
+            "program has closed it. Choose Remote Control at the top right of the pendant, then start again"
+            if mode == _ARM_RUNNING
+            else "the arm is not powered, or its brakes are not released: power it on, then start again"
+        )
+        raise RobotRefused(
+            f"the controller {self.host} has not run a test program of one line within {self._timeout:g} s, so it "
+            f"would not run a stop either: {remedy}"
+        )
 
     def use(self, path: StopPath, deceleration: float) -> bool:
         """Send one stop without waiting.

@@ -238,9 +238,14 @@ class SpeedReduction:
         if self._halted_from is None and before is not None and before > _SLIDER_TOLERANCE:
             self._halted_from = before
 
+    @property
+    def halted(self) -> bool:
+        """True where a stop has put the slider to 0, and it is still there."""
+        return self._halted_from is not None and self.slider is not None and self.slider <= _SLIDER_TOLERANCE
+
     def release(self, out: Outputs) -> None:
         """Put a slider that a stop has put to 0 back where it was, unless a person has moved it since."""
-        before, self._halted_from = self._halted_from, None
-        if before is not None and self.slider is not None and self.slider <= _SLIDER_TOLERANCE:
+        halted, before, self._halted_from = self.halted, self._halted_from, None
+        if before is not None and halted:
             out.append(SetSpeedSlider(before))
             self.slider = before

@@ -19,7 +19,7 @@ from coneskin.robot.arm.inertia import joint_torques, mass_matrix
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
+from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.value_functions import ValueFunctions
 from coneskin.robot.sim.urscript.values import (
@@ -70,7 +70,7 @@ class Builtins(
 
     def sleep(self, t: float) -> Wait:
         """Wait for a time [s]."""
-        for _ in range(round(t / CYCLE)):
+        for _ in range(round(t / self._host.steptime)):
             yield
 
     def textmsg(self, *words: Any) -> None:
@@ -86,7 +86,7 @@ class Builtins(
 
     def get_steptime(self) -> float:
         """Return the control cycle [s]."""
-        return CYCLE
+        return self._host.steptime
 
     # kinematics
 
@@ -248,17 +248,18 @@ class Builtins(
         yield
 
     def set_payload(self, m: float, cog: Any = None, inertia: Any = None) -> None:
-        """Set the payload [kg], its centre of gravity [m] and inertia [kg m^2]; it has no effect on the motion.
+        """Set the payload [kg], its centre of gravity [m] and inertia [kg m^2].
 
         What is not given: the centre of gravity stays as it is, the inertia becomes zero.
         """
         self._host.payload = number(m, "a payload")
         if cog is not None:
             self._host.payload_cog = tuple(numbers(cog, 3, "a centre of gravity"))
+        self._arm.carry(self._host.payload, self._host.payload_cog)
         self._host.payload_inertia = (0.0,) * 6 if inertia is None else tuple(numbers(inertia, 6, "an inertia"))
 
     def set_target_payload(self, m: float, cog: Any, inertia: Any = None, transition_time: float = 0.0) -> None:
-        """Set the payload at once: what it weighs has no effect on the motion."""
+        """Set the payload at once."""
         number(transition_time, "a transition time")
         self.set_payload(m, cog, inertia)
 

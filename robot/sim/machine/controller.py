@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from typing import IO, Any
 
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
+from coneskin.robot.sim.motion.arm import CYCLE, SUDDEN_CHANGE, TRIGGERED, SimulatedArm, StopCause
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantLost
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError, values_of
@@ -53,29 +53,29 @@ class _SafetySystem:
 
     Attributes:
         mode: its state.
-        stopped_at: cycle of the last protective stop.
+        stopped_at: controller time of the last protective stop [s].
     """
 
     def __init__(self, unlock_after: float, log: Callable[..., None], tell: Callable[[Notice], None]) -> None:
         self.mode = SafetyMode.NORMAL
-        self.stopped_at = 0
+        self.stopped_at = 0.0
         self._reduced = False
         self._unlock_after, self._log, self._tell = unlock_after, log, tell
 
-    def protective_stop(self, reason: str, cause: StopCause, cycle: int) -> bool:
+    def protective_stop(self, reason: str, cause: StopCause, now: float) -> bool:
         """Begin a protective stop; return False where the arm may not move anyway."""
         if self.mode not in MOVING:
             return False
         self._enter(SafetyMode.PROTECTIVE_STOP)
-        self.stopped_at = cycle
+        self.stopped_at = now
         self._log("protective_stop", reason=reason, cause=str(cause))
         self._tell(ErrorNotice(cause.code, cause.argument, Report.WARNING, reason))
         return True
 
-    def unlock(self, cycle: int, early: bool) -> bool:
+    def unlock(self, now: float, early: bool) -> bool:
         """End a protective stop; return False where it is too early, and that is not allowed."""
         if self.mode is SafetyMode.PROTECTIVE_STOP:
-            if not early and (cycle - self.stopped_at) * CYCLE < self._unlock_after:
+            if not early and now - self.stopped_at < self._unlock_after:
                 return False
             self._log("unlocked")
             self._release()
@@ -169,7 +169,9 @@ class Controller:
         self.arm.kinematic = plant is None
         self.plant_lost = ""
         self.cycle = 0
-        self.inputs = ClientInputs(self.log)
+        self.inputs = ClientInputs(self.log, options.fieldbus)
+        self.inputs.watchdog_delay = options.watchdog_delay
+        self.arm.deceleration = options.deceleration
         self.output_ints = [0] * 48
         self.output_doubles = [0.0] * 48
         self.digital_outputs = 0
@@ -207,8 +209,18 @@ class Controller:
         """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
         return self.slider * _REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
 
+    @property
+    def steptime(self) -> float:
+        """Control cycle, in which each thread of a program takes one turn [s]."""
+        return self.options.steps * CYCLE
+
+    def hold_up(self, seconds: float) -> None:
+        """Note that the computer has held this controller up: its clock goes on, its arm has stood still meanwhile."""
+        self.frozen += seconds
+        self.log("held_up", seconds=round(seconds, 3))
+
     def update(self) -> None:
-        """Run one control cycle."""
+        """Run one step of 2 ms: a control cycle, or on CB3 a quarter of one."""
         self.cycle += 1
         if self._due is not None and self.cycle >= self._due[0]:
             self._start(self._due[1])
@@ -217,6 +229,7 @@ class Controller:
         self._turn_programs()
         was_turning = self.arm.turning
         held = self.runtime.paused or self.safety not in MOVING
+        self.arm.category_0 = self.safety not in MOVING and self.safety is not SafetyMode.SAFEGUARD_STOP
         fault = self.arm.update(self.speed_scaling, hold=held)
         self._update_plant()
         if was_turning and not self.arm.turning:
@@ -242,6 +255,8 @@ class Controller:
             self.stop_program("the plant is lost")
 
     def _turn_programs(self) -> None:
+        if self.cycle % self.options.steps:
+            return
         for secondary in list(self.secondary):
             try:
                 secondary.turn()
@@ -354,7 +369,7 @@ class Controller:
 
     def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
         """Stop the arm and hold the program, until a person unlocks it."""
-        if not self.safety_system.protective_stop(reason, cause, self.cycle):
+        if not self.safety_system.protective_stop(reason, cause, self.timestamp):
             return
         if self.options.after_protective_stop == "stop":
             self.stop_program("protective stop")
@@ -363,7 +378,7 @@ class Controller:
 
     def unlock(self, early: bool = False) -> bool:
         """End a protective stop; return False where it is too early, and that is not allowed."""
-        return self.safety_system.unlock(self.cycle, early)
+        return self.safety_system.unlock(self.timestamp, early)
 
     def safeguard(self, open: bool) -> str:
         """Open or close the safeguard: the arm brakes, the program is held, and a person has to start it again."""
@@ -396,8 +411,10 @@ class Controller:
         """Take the values of a client's data packet, name -> value, in the order of its recipe."""
         self.inputs.write(values, self.cycle)
         if values.get("speed_slider_mask"):
-            self.slider = min(1.0, max(0.0, float(values["speed_slider_fraction"])))  # type: ignore[arg-type]
+            before, self.slider = self.slider, min(1.0, max(0.0, float(values["speed_slider_fraction"])))  # type: ignore[arg-type]
             self.log("slider", fraction=self.slider)
+            if before == 0.0 < self.slider and self.runtime is Runtime.PLAYING and self.arm.motion is not None:
+                self.protective_stop("the speed slider was raised from 0 while a program moved the arm", SUDDEN_CHANGE)
         for bit, on in digital_outputs(values):
             self.set_digital(1 << bit, on)
         self.terminals.write_analog(values)

@@ -29,6 +29,13 @@ INPUTS = frozenset(
 )
 
 
+#: what an adapter for EtherNet/IP or PROFINET holds, by the RTDE guide: registers 0 to 23, and bits 0 to 31
+_FIELDBUS_INPUTS = (
+    "input_bit_registers0_to_31",
+    *(f"input_{kind}_register_{number}" for kind in ("int", "double") for number in range(24)),
+)
+
+
 @dataclass(slots=True)
 class InputWatchdog:
     """Watchdog that a client must feed by writing an input variable, as rtde_set_watchdog sets it.
@@ -55,19 +62,24 @@ class ClientInputs:
 
     Args:
         log: takes an event and its facts.
+        fieldbus: an adapter on a fieldbus holds the lower half of the registers.
 
     Attributes:
         owners: name of an input -> the session that may write it.
         watchdogs: name of an input -> the watchdog on it.
+        watchdog_delay: by which every watchdog is late [s].
         external_forces: whether a client's external_force_torque counts as the measured one.
     """
 
-    def __init__(self, log: Callable[..., None]) -> None:
+    def __init__(self, log: Callable[..., None], fieldbus: bool = False) -> None:
         self.owners: dict[str, object] = {}
         self.watchdogs: dict[str, InputWatchdog] = {}
         self._values: dict[str, Value] = dict.fromkeys(INPUTS, 0)
         self._values["external_force_torque"] = (0.0,) * 6
+        if fieldbus:
+            self.owners.update(dict.fromkeys(_FIELDBUS_INPUTS, "fieldbus"))
         self.external_forces = False
+        self.watchdog_delay = 0.0
         self._log = log
         self._fresh = False  # a command register was written, and no program has read it
 
@@ -117,7 +129,7 @@ class ClientInputs:
         """Watch an input from a cycle on, as the script function rtde_set_watchdog does; 0 Hz ends it."""
         self.watchdogs.pop(variable, None)
         if frequency > 0.0:
-            self.watchdogs[variable] = InputWatchdog(variable, 1.0 / frequency, action, cycle)
+            self.watchdogs[variable] = InputWatchdog(variable, 1.0 / frequency + self.watchdog_delay, action, cycle)
 
 
 CURRENT = 0  #: domain of an analog terminal

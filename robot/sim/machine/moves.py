@@ -11,7 +11,7 @@ from typing import Any
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inverse_kinematics import nearest
-from coneskin.robot.sim.motion.arm import CYCLE, INVALID_SETPOINT, JOINT_ACCELERATION, Motion, MotionFault
+from coneskin.robot.sim.motion.arm import INVALID_SETPOINT, JOINT_ACCELERATION, Motion, MotionFault
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
 from coneskin.robot.sim.motion.path import JointLine, Path, ToolArc, ToolLine
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show
@@ -126,7 +126,7 @@ class MoveFunctions:
         program that gives a speed for each cycle goes the whole of its way. What goes beyond t counts for the next.
         """
         self._arm.motion = motion
-        cycles = max(1, round(t / CYCLE))
+        cycles = max(1, round(t / self._host.steptime))
         passed = motion.surplus if t > 0.0 else 0.0
         motion.surplus = 0.0
         while True:
@@ -186,7 +186,7 @@ class MoveFunctions:
         else:
             motion = ServoJoints(q, lookahead_time, gain)
             self._host.log("motion", kind="ServoJoints", program=self._program.name, target=list(q))
-        yield from self._sustain(motion, max(t, CYCLE))
+        yield from self._sustain(motion, max(t, self._host.steptime))
 
     def servoc(self, pose: Any, a: float = 1.2, v: float = 0.25, r: float = 0.0) -> Wait:  # noqa: ARG002
         """Follow a pose; simulated as servoj to its joint positions with default smoothing."""

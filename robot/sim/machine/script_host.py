@@ -49,6 +49,10 @@ class ScriptHost(Protocol):
     payload_inertia: tuple[float, ...]
 
     @property
+    def steptime(self) -> float:
+        """Control cycle [s]."""
+
+    @property
     def speed_scaling(self) -> float:
         """Share of the commanded speeds at which the arm moves, 0..1."""
 

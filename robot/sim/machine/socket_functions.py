@@ -15,7 +15,6 @@ import struct
 from collections.abc import Callable, Generator
 from typing import Any
 
-from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.urscript.value_functions import text_of
 from coneskin.robot.sim.urscript.values import Array, ScriptError, number, show
 
@@ -47,7 +46,7 @@ class SocketFunctions:
         if len(self._program.sockets) >= _MAX_SOCKETS:
             raise ScriptError(f"a program opens at most {_MAX_SOCKETS} sockets at once")
         self._program.sockets[str(socket_name)] = connection = ScriptSocket(where, int(port))
-        for _ in range(round(CONNECT_TIMEOUT / CYCLE)):
+        for _ in range(round(CONNECT_TIMEOUT / self._host.steptime)):
             connected = connection.connect()
             if connected:
                 return True
@@ -192,7 +191,7 @@ class SocketFunctions:
     def _wait(self, name: Any, timeout: Any, take: Callable[[ScriptSocket], bool]) -> Generator[None, None, None]:
         """Wait until something could be taken, the timeout [s] is over, or the server has gone."""
         limit = number(timeout, "a timeout")
-        cycles = round(limit / CYCLE) if limit > 0.0 else 0
+        cycles = round(limit / self._host.steptime) if limit > 0.0 else 0
         begin, waited = self._host.outside_time(), 0
         while True:
             connection = self._program.sockets.get(str(name))
@@ -205,7 +204,9 @@ class SocketFunctions:
                     return
             yield
             waited += 1
-            late = waited >= cycles and self._host.outside_time() - begin > limit - 0.5 * CYCLE  # the server's time too
+            late = (
+                waited >= cycles and self._host.outside_time() - begin > limit - 0.5 * self._host.steptime
+            )  # the server's time too
             if connection is None or connection.ended or (limit > 0.0 and late):
                 return
 

@@ -14,7 +14,9 @@ from typing import Literal
 
 __all__ = [
     "DEFAULT_MODEL",
+    "FIRST_X",
     "MOVING",
+    "PORTS",
     "START_Q",
     "ErrorNotice",
     "Notice",
@@ -108,6 +110,9 @@ def robot_bits(mode: RobotMode, program: bool) -> int:
 
 Version = tuple[int, int]
 
+#: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
+PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
+FIRST_X = 10  #: major version of PolyScope X
 #: arm that is simulated where none is named
 DEFAULT_MODEL = "UR5e"
 #: default joint positions at the start [rad]; clear of every singular position
@@ -130,6 +135,10 @@ class Options:
         external_control: host and port from which a program takes the script of its External Control node.
         remote_control: whether the robot starts under remote control. In local control it takes no program, and no
             command that changes anything.
+        closed: services that are switched off, as all are on a robot that comes from the factory since 5.10.
+        watchdog_delay: by which the watchdog on an input is late [s].
+        deceleration: of the leading joint where nothing commands one, as in a pause; an assumption [rad/s^2].
+        fieldbus: an EtherNet/IP or PROFINET adapter holds the lower half of the input registers.
     """
 
     model: str = DEFAULT_MODEL
@@ -142,6 +151,21 @@ class Options:
     programs: Path | None = None
     external_control: tuple[str, int] = ("127.0.0.1", 50002)
     remote_control: bool = True
+    closed: frozenset[str] = frozenset()
+    fieldbus: bool = False
+    watchdog_delay: float = 0.0
+    deceleration: float = 10.0
+
+    @property
+    def steps(self) -> int:
+        """Steps of the simulation, of 2 ms each, in a control cycle: CB3 has 125 Hz."""
+        return 4 if self.version[0] == 3 else 1
+
+    @property
+    def services(self) -> dict[str, int]:
+        """Services that are open -> their TCP ports. PolyScope X has no dashboard."""
+        closed = self.closed | {"dashboard"} if self.version[0] >= FIRST_X else self.closed
+        return {name: port for name, port in PORTS.items() if name not in closed}
 
 
 class Report(IntEnum):

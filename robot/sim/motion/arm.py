@@ -1,9 +1,12 @@
 """Simulated arm: positions, speeds, its tool, and the checks of its safety system.
 
 Positions and speeds are those that the trajectory generator commands; what the plant makes of them is ``measured``. The
-default one tracks ideally: no friction, no vibration, no payload. What the motors cannot do is not done: a motion that
-takes more torque than they have ends in a protective stop. Stops are not held to that: each is a ramp of joint speeds
-to zero.
+default one tracks ideally: no friction, no vibration. What the motors cannot do is not done: a motion that takes more
+torque than they have, with the payload that the program has set, ends in a protective stop, and a stop takes longer.
+
+A controlled stop is a ramp of joint speeds to zero. A stop of category 0, of a protective or an emergency stop, brakes
+as hard as the motors can, and softer towards its end. Its law is fitted to Universal Robots' tables: ``python -m bench
+stopping-times`` prints both.
 
 Source of the causes of a stop: Universal Robots, "Error Codes", PolyScope 5: numbers, arguments and titles. What
 exactly makes a real controller give each is not published. docs/look-up/sim-ur.md has what makes this one give it.
@@ -18,7 +21,7 @@ from typing import Protocol
 
 from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.inertia import arm_inertia, joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 
@@ -36,7 +39,6 @@ __all__ = [
     "MotionFault",
     "SimulatedArm",
     "StopCause",
-    "decelerate",
     "integrate",
     "max_abs",
 ]
@@ -84,6 +86,13 @@ MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajecto
 _STANDSTILL_SPEED = 1e-3  # rad/s; measured speeds up to it count as none: a plant with dynamics never rests entirely
 _SPEED_MARGIN = 1.01  # share of its highest speed at which the safety system stops a joint
 _EASY_ACCELERATION = 5.0  # rad/s^2, of every joint; what no arm's motors lack the torque for: it is not worked out
+_HARDEST_BRAKING = 50.0  # rad/s^2 of the leading joint; an assumption for arms without a load
+_WEAKEST_BRAKING = 0.5  # rad/s^2 of a joint whose motor has no torque left; a real one would sag
+_HELD_SHARE = 1.25  # of its highest torque, that a joint at rest withstands by friction; fitted to the UR5's elbow
+_FADING_POWER = 1.0 / 3.0  # of speed over highest speed, with which a stop of category 0 softens; fitted
+_LEAST_SHARE = 1e-3  # of a joint's highest speed; below, a stop softens no further
+_MAX_PAYLOAD, _MAX_PAYLOAD_LEVER = 100.0, 2.0  # kg, m; a payload beyond is none of an arm, and is not simulated
+_BRAKING_CYCLES = 4  # between two calculations of what the motors can do
 
 
 class MotionFault(Exception):
@@ -130,6 +139,8 @@ class SimulatedArm:
         kinematic: True where the plant does exactly what is commanded.
         tcp: tool centre point in the flange frame.
         motion: command that moves the arm; None where the arm brakes or stands.
+        deceleration: of the controller where a command gives none [rad/s^2].
+        category_0: True where it has to stop as hard as it can.
 
     Raises:
         RobotRefused: the first position is outside the limits of a joint.
@@ -150,6 +161,14 @@ class SimulatedArm:
         self.kinematic = True
         self.tcp = Pose()
         self.motion: Motion | None = None
+        self.category_0 = False
+        self.deceleration = CONTROLLER_DECELERATION
+        self._feasible, self._feasible_for = 0.0, 0  # what the motors can brake with [rad/s^2], and for how many cycles
+
+    def carry(self, mass: float, centre: Sequence[float]) -> None:
+        """Let the arm carry a payload of a mass [kg] whose centre of mass is at a place in the flange's frame [m]."""
+        possible = mass <= _MAX_PAYLOAD and max_abs(centre) <= _MAX_PAYLOAD_LEVER
+        self.inertia = loaded(arm_inertia(self.model), mass, centre) if possible else arm_inertia(self.model)
 
     def update(self, scale: float, hold: bool) -> MotionFault | None:
         """Advance by one cycle; return why the safety system must stop the arm, if it must."""
@@ -159,8 +178,10 @@ class SimulatedArm:
             return None
         try:
             if motion is None:
-                q, qd = decelerate(self.q, self.qd, CONTROLLER_DECELERATION)
+                q, qd = self.brake()
             else:
+                if not (hold or motion.brakes):
+                    self._feasible_for = 0
                 q, qd = motion.update(self, scale, hold)
                 self._check(q, qd)
                 if not (hold or motion.brakes):
@@ -168,12 +189,49 @@ class SimulatedArm:
         except (MotionFault, ArithmeticError, ValueError) as exc:  # numbers of a program that are finite, but huge
             fault = exc if isinstance(exc, MotionFault) else MotionFault(INVALID_SETPOINT, str(exc))
             self.motion = None
-            q, qd = decelerate(self.q, self.qd, CONTROLLER_DECELERATION)
+            q, qd = self.brake()
         if motion is not None and motion.done:
             self.motion = None
         self.qdd = [(new - old) / CYCLE for new, old in zip(qd, self.qd, strict=True)]
         self.q, self.qd = q, qd
         return fault
+
+    def brake(self, rate: float = 0.0) -> tuple[list[float], list[float]]:
+        """Return positions and speeds after a cycle of braking, all joints in proportion; see `braking`."""
+        lead = max_abs(self.qd)
+        if lead == 0.0:
+            return list(self.q), [0.0] * 6
+        share = max(0.0, 1.0 - self.braking(rate) * CYCLE / lead)
+        slower = [speed * share for speed in self.qd]
+        return integrate(self.q, self.qd, slower), slower
+
+    def braking(self, rate: float = 0.0) -> float:
+        """Return the deceleration of the leading joint in this cycle [rad/s^2].
+
+        Args:
+            rate: that is asked for; 0 for the controller's own. It is less where the motors cannot do it.
+        """
+        if self._feasible_for <= 0 and any(self.qd):
+            self._feasible, self._feasible_for = self.feasible_braking(), _BRAKING_CYCLES
+        self._feasible_for -= 1
+        if not self.category_0:
+            return min(rate or self.deceleration, self._feasible)
+        share = max_abs([speed / highest for speed, highest in zip(self.qd, self.model.joint_speed, strict=True)])
+        return self._feasible * math.pow(min(1.0, max(share, _LEAST_SHARE)), _FADING_POWER)
+
+    def feasible_braking(self) -> float:
+        """Return how hard the arm can brake in proportion, by its motors' torques: of the leading joint [rad/s^2]."""
+        lead = max_abs(self.qd)
+        back = [-speed / lead for speed in self.qd]
+        still = joint_torques(self.model, self.inertia, self.q, self.qd, ZERO_VELOCITY)
+        braking = joint_torques(self.model, self.inertia, self.q, self.qd, back)
+        found = _HARDEST_BRAKING
+        for speed, limit, torque, with_it in zip(self.qd, self.inertia.torque, still, braking, strict=True):
+            slope = with_it - torque
+            most = limit if speed else _HELD_SHARE * limit
+            if slope:
+                found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
+        return max(found, _WEAKEST_BRAKING)
 
     def put(self, q: Sequence[float]) -> None:
         """Put an arm that stands at joint positions [rad], without a motion."""
@@ -306,16 +364,6 @@ def _solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> li
 def max_abs(values: Sequence[float]) -> float:
     """Return the greatest magnitude: that of the leading joint."""
     return max(abs(value) for value in values)
-
-
-def decelerate(q: Sequence[float], qd: Sequence[float], rate: float) -> tuple[list[float], list[float]]:
-    """Slow all joints down in proportion for one cycle, the leading one at a rate [rad/s^2]; return q and qd."""
-    lead = max_abs(qd)
-    if lead == 0.0:
-        return list(q), [0.0] * 6
-    share = max(0.0, 1.0 - rate * CYCLE / lead)
-    slower = [speed * share for speed in qd]
-    return integrate(q, qd, slower), slower
 
 
 def integrate(q: Sequence[float], before: Sequence[float], after: Sequence[float]) -> list[float]:

@@ -1,7 +1,7 @@
 """Motions of the simulated arm that follow a speed or a stream of positions, and stops, in steps of 2 ms.
 
 Continuous position and speed, bounded acceleration. Assumed, because no manual says it: the deceleration of a pause, of
-a protective stop and of a program that ends while the arm moves (`CONTROLLER_DECELERATION`).
+a safeguard stop and of a program that ends while the arm moves (`CONTROLLER_DECELERATION`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from .arm import (
     SUDDEN_CHANGE,
     MotionFault,
     SimulatedArm,
-    decelerate,
     integrate,
     max_abs,
 )
@@ -52,7 +51,7 @@ class SpeedJoints(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            return decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
+            return arm.brake()
         delta = [scale * a - b for a, b in zip(self.target, arm.qd, strict=True)]
         lead, step = max_abs(delta), self.acceleration * CYCLE
         if lead <= step:
@@ -80,7 +79,7 @@ class SpeedTool(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            q, qd = decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
+            q, qd = arm.brake()
             self.twist = arm.twist()
             return q, qd
         delta = [scale * a - b for a, b in zip(self.target, self.twist, strict=True)]
@@ -122,7 +121,7 @@ class ServoJoints(_Sustained):
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
         if hold:
-            return decelerate(arm.q, arm.qd, CONTROLLER_DECELERATION)
+            return arm.brake()
         largest = JOINT_ACCELERATION * CYCLE
         qd = []
         self._check_jump(arm.q)
@@ -145,7 +144,7 @@ class ServoJoints(_Sustained):
 class StopJoints:
     """Ramp of all joints to a standstill in proportion, the leading one at a deceleration [rad/s^2] (stopj).
 
-    The speed slider does not act.
+    It is softer where the motors lack the torque. The speed slider does not act.
     """
 
     brakes = True
@@ -156,8 +155,8 @@ class StopJoints:
 
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:  # noqa: ARG002
         """Return joint positions [rad] and speeds [rad/s] after one cycle; see `Motion.update`."""
-        rate = max(self.deceleration, CONTROLLER_DECELERATION) if hold else self.deceleration
-        q, qd = decelerate(arm.q, arm.qd, rate)
+        rate = max(self.deceleration, arm.deceleration) if hold else self.deceleration
+        q, qd = arm.brake(rate)
         self.done = not any(qd)
         return q, qd
 

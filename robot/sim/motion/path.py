@@ -99,8 +99,8 @@ class Path:
         profile = self.profile
         lead = max_abs(arm.qd)
         brake = profile.acceleration
-        if hold and lead > 0.0:
-            brake = max(brake, CONTROLLER_DECELERATION * profile.sdot / lead)
+        if hold and lead > 0.0 < profile.sdot:
+            brake = arm.braking(max(brake * lead / profile.sdot, arm.deceleration)) * profile.sdot / lead
         profile.update(0.0 if hold else profile.speed * scale, brake)
 
     def settle(self, q: list[float], qd: list[float]) -> tuple[list[float], list[float]]:

@@ -29,6 +29,7 @@ from coneskin.robot.sim.machine.states import (
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
+    Report,
     RobotMode,
     SafetyMode,
     SafetyNotice,
@@ -156,7 +157,18 @@ _CONTROL_MODE_POSITION = 0
 _JOINT_RUNNING, _JOINT_OFF, _JOINT_IDLE = 253, 239, 255  # modes of a joint
 _TOOL_RUNNING = 253  # mode of the tool
 #: size of an arm -> its number as robot type
-_ROBOT_TYPES = {"UR5": 1, "UR7": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8, "UR15": 9}
+_ROBOT_TYPES = {
+    "UR5": 1,
+    "UR7": 1,
+    "UR10": 2,
+    "UR12": 2,
+    "UR3": 3,
+    "UR16": 4,
+    "UR18": 5,
+    "UR20": 7,
+    "UR30": 8,
+    "UR15": 9,
+}
 _ROBOT_SUBTYPES = {3: 0, 5: 3}  # major version of the software -> sub-type, as recorded from 5.24
 _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
 _DEFAULT_MOTION = (
@@ -239,7 +251,7 @@ def _configuration(model: ArmModel, major: int) -> bytes:
 
 
 _STATE_CYCLES = 50  # between two states of primary and secondary interface: 10 Hz
-_REALTIME_CYCLES = {3: 4}  # major version of the software -> cycles between two packets; 1 else (CB3 has 125 Hz)
+_READ_ONLY = 210  # number of the error of a connection that takes no program
 
 
 class Publisher:
@@ -247,7 +259,6 @@ class Publisher:
 
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
-        self._realtime_cycles = _REALTIME_CYCLES.get(controller.options.version[0], 1)
 
     def greeting(self, name: str) -> bytes:
         """Return what a new client of a port gets first."""
@@ -270,7 +281,7 @@ class Publisher:
         changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
         if (changed or c.cycle % _STATE_CYCLES == 0) and listening & {"primary", "secondary"}:
             states |= dict.fromkeys(listening & {"primary", "secondary"}, _encode_state(c))
-        if "realtime" in listening and c.cycle % self._realtime_cycles == 0:
+        if "realtime" in listening and c.cycle % c.options.steps == 0:
             states["realtime"] = _encode_realtime(c)
         due = {name: (state, b"") for name, state in states.items()}
         if "primary" in listening and notices:
@@ -312,11 +323,13 @@ class ScriptPort:
     def __call__(self, data: bytes) -> bytes:
         """Take bytes; nothing is answered, but to a program that is too long. In local control nothing is taken.
 
-        Nor is it after a switch to remote control, over a connection that was opened before.
+        Nor is it after a switch to remote control, over a connection that was opened before: it stays read-only, which
+        the primary interface says.
         """
         if self._opened_local or not self._controller.remote_control:
             self._controller.log("dropped", reason="local control")
-            return b""
+            notice = ErrorNotice(_READ_ONLY, 0, Report.WARNING, "The connection is read-only")
+            return _encode_notice(self._controller.timestamp, notice) if self._messages else b""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))
         if len(self._rest) > MAX_LENGTH:
             self._rest, self.left = "", True

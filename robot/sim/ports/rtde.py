@@ -273,7 +273,9 @@ class RtdeSession:
             self._getters = [
                 (self._outputs.getter(name), kind.startswith("VECTOR")) for name, kind in zip(names, types, strict=True)
             ]
-            self._every = max(1, round(500.0 / max(frequency, _MIN_FREQUENCY))) if frequency > 0.0 else 1
+            steps = self._c.options.steps
+            rate = max(frequency, _MIN_FREQUENCY) if frequency > 0.0 else 500.0
+            self._every = steps * max(1, round(500.0 / steps / rate))
         return bytes([self._recipe is not None]) + _list(types)
 
     def _set_inputs(self, payload: bytes) -> bytes:

@@ -47,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--check", action="store_true", help="list what is in the scene; open and start nothing")
     add("--simulated", action="store_true", help="start a simulated controller at the scene's host")
     add("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
+    add(
+        "--measured",
+        type=Path,
+        metavar="FILE",
+        help="compare the scene with what scripts/measure_controller.py has seen",
+    )
     add("--yes", action="store_true", help="make the changes of the scene without asking")
     add("--json", action="store_true", help="print each finding as a JSON object, one per line")
 
@@ -72,6 +78,10 @@ def run(args: argparse.Namespace) -> int:
         print(f"       >>  {words}", file=sys.stderr, flush=True)
 
     doctor = Doctor(scene, tell, ask, not args.no_touches)
+    if args.measured:
+        from coneskin.robot.ur.measured import compare, read_measured
+
+        doctor.note(*compare(read_measured(args.measured), scene.monitoring_limits))
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
     code = exit_code(doctor.findings)

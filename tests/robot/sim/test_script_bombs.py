@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from coneskin.robot.sim.machine import program
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import _MAX_SECONDARY, Controller
-from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.machine.states import PORTS, Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.server import _MAX_CLIENTS, PORTS, Server
+from coneskin.robot.sim.server import _MAX_CLIENTS, Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError
 from coneskin.robot.ur.rtde_codec import (

@@ -251,6 +251,22 @@ def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
         assert all(len(clients) == 10 for name, clients in server._clients.items() if name in PORTS)
 
 
+@pytest.mark.parametrize(
+    ("options", "missing"),
+    [({"closed": frozenset({"primary", "RTDE"})}, {"primary", "RTDE"}), ({"version": (10, 11)}, {"dashboard"})],
+)
+def test_what_is_switched_off_or_not_there_takes_no_connection(options: dict[str, object], missing: set[str]) -> None:
+    with Server(Controller(Options(**options)), free_host()) as server:  # type: ignore[arg-type]
+        server.cut("dashboard")
+        server.restore("dashboard")
+        for name, port in PORTS.items():
+            if name not in missing:
+                socket.create_connection((server.host, port), 1.0).close()
+                continue
+            with pytest.raises(ConnectionRefusedError):
+                socket.create_connection((server.host, port), 1.0)
+
+
 def test_a_controller_that_was_frozen_has_lost_cycles_and_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """A client would else take every later state for a late one."""
     now = [100.0]

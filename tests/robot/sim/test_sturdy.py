@@ -17,12 +17,12 @@ import pytest
 from coneskin.robot.sim import compiler
 from coneskin.robot.sim import server as server_module
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.machine.states import PORTS, Options
 from coneskin.robot.sim.ports import client as client_module
 from coneskin.robot.sim.ports.client_interface import MESSAGE, ROBOT_STATE
 from coneskin.robot.sim.ports.rtde import RtdeOutputs, RtdeSession
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.sim.server import PORTS, Server
+from coneskin.robot.sim.server import Server
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, Translation
 from coneskin.robot.ur.rtde_codec import (
     PacketKind,

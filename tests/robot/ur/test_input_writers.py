@@ -7,7 +7,16 @@ import pytest
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
-from coneskin.robot.ur.input_writers import SETPOINT_INPUTS, RegisterWriter, _register_values, program_text
+from coneskin.robot.ur.input_writers import (
+    SETPOINT_INPUTS,
+    SLIDER_INPUTS,
+    RegisterWriter,
+    RtdeSpeedSlider,
+    _register_values,
+    decode_fraction,
+    program_text,
+    set_slider,
+)
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
@@ -111,6 +120,24 @@ def test_speeds_that_the_last_guard_has_left_move_nothing(simulated):
             assert time.monotonic() < end
             assert writer.wait(PATIENCE).speed == 0.0
         assert "watchdog" not in simulated.events("stopped")[-1]["reason"]
+
+
+def test_the_slider_belongs_to_others_until_a_stop_takes_it(simulated):
+    with RtdeSpeedSlider(simulated.host, PATIENCE, claim=False) as slider:
+        with RtdeConnection(simulated.host, PATIENCE) as other:
+            assert other.send(other.ask_inputs(SLIDER_INPUTS), (1, 0.5))
+            while decode_fraction(slider.wait_data(PATIENCE)) != 0.5:
+                pass
+            with pytest.raises(RobotRefused, match="the speed slider of"):
+                RtdeSpeedSlider(simulated.host, PATIENCE, claim=False).__enter__()
+        while True:  # the controller notices the end of the other connection in its own time
+            assert slider.set(0.0)
+            if decode_fraction(slider.wait_data(PATIENCE)) == 0.0:
+                break
+            slider._claimed = False
+        with RtdeConnection(simulated.host, PATIENCE) as other, pytest.raises(RobotRefused, match="in use"):
+            other.ask_inputs(SLIDER_INPUTS)
+    assert set_slider(simulated.host, 1.0, PATIENCE)
 
 
 def test_a_register_that_another_client_has_taken_is_named(simulated):

@@ -126,12 +126,45 @@ def test_a_controller_in_local_control_is_refused_and_one_that_is_switched_is_to
                 sock.close()
 
 
+def test_a_program_that_is_not_seen_to_run_proves_no_stop(controller, monkeypatch):
+    """The dashboard answers, and the script port swallows what it is sent, as a read-only one does."""
+    monkeypatch.setattr(StopSockets, "run", lambda *_: True)
+    with pytest.raises(RobotRefused, match=r"has not run a test program .* \(C210\).* Remote Control"):
+        StopSockets(controller.host, 0.5).__enter__()
+
+
+def test_a_refused_stop_is_an_answer_too(controller):
+    with StopSockets(controller.host, PATIENCE) as stops:
+        controller.call("local control")
+        try:
+            stops.use(StopPath.COMMAND, 5.0)
+            gone = []
+            while not gone:
+                select.select([stops.sockets()["command"]], (), (), PATIENCE)
+                gone = stops.drain()
+            assert all("local control" in why for _, _, why in gone)
+        finally:
+            controller.call("remote control")
+            for _, sock, _ in gone:
+                sock.close()
+
+
+def test_polyscope_x_is_refused_in_one_line():
+    with (
+        served(version=(10, 11)) as controller,
+        pytest.raises(RobotRefused, match=r"PolyScope X \(10\.11\)") as refused,
+    ):
+        StopSockets(controller.host, PATIENCE).__enter__()
+    assert "29999" not in str(refused.value)
+
+
 @pytest.mark.parametrize("answer", [b"", b"Connected: Universal Robots Dashboard Server\n"])
 def test_a_dashboard_that_answers_nothing_proves_no_stop(monkeypatch, answer):
     ours, theirs = socket.socketpair()
     with ours, theirs:
         theirs.sendall(answer)
         monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
+        monkeypatch.setattr("coneskin.robot.ur.stop_sockets.refuse_polyscope_x", lambda *_: None)
         with pytest.raises(RobotConnectionError, match="does not answer within"), StopSockets("127.0.0.1", 0.05):
             pass
 
@@ -141,6 +174,8 @@ def test_software_that_knows_no_local_control_is_taken(monkeypatch):
     with ours, theirs:
         theirs.sendall(b"Connected: Universal Robots Dashboard Server\ncould not understand: 'is in remote control'\n")
         monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
+        monkeypatch.setattr("coneskin.robot.ur.stop_sockets.refuse_polyscope_x", lambda *_: None)
+        monkeypatch.setattr(StopSockets, "_prove_program", lambda _: None)
         with StopSockets("127.0.0.1", PATIENCE) as stops:
             assert list(stops.sockets()) == ["program", "command"]
 
@@ -211,5 +246,10 @@ def test_no_controller_there():
     host = free_host()
     with pytest.raises(RobotConnectionError, match=rf"cannot reach the controller {host}:30004"):
         StateReader(host).__enter__()
-    with pytest.raises(RobotConnectionError, match=rf"cannot reach port 30003 of the controller {host}"):
+    with pytest.raises(RobotConnectionError, match=rf"cannot reach the controller {host}:30004"):
         StopSockets(host).__enter__()
+    with (
+        served(closed=frozenset({"realtime"})) as controller,
+        pytest.raises(RobotConnectionError, match=rf"cannot reach port 30003 of the controller {controller.host}"),
+    ):
+        StopSockets(controller.host).__enter__()

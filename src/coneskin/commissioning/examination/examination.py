@@ -84,15 +84,16 @@ class Doctor:
 
     def examine(self) -> None:
         """Examine everything that the scene names."""
-        self._note(*_packages(self.scene))
-        self._note(*(one for one in suspicions(self.scene) if one.item != "packages"))
+        self.note(*_packages(self.scene))
+        self.note(*(one for one in suspicions(self.scene) if one.item != "packages"))
         self._examine_source()
         if self.scene.arm is None:
-            self._note(Finding("arm", "not tried", "the scene has no [arm]"))
+            self.note(Finding("arm", "not tried", "the scene has no [arm]"))
         else:
-            self._note(*_arm(self.scene, self.scene.arm))
+            self.note(*_arm(self.scene, self.scene.arm))
 
-    def _note(self, *findings: Finding) -> None:
+    def note(self, *findings: Finding) -> None:
+        """Keep and tell findings."""
         for finding in findings:
             self.findings.append(finding)
             self._tell(finding)
@@ -101,15 +102,15 @@ class Doctor:
         scene, source = self.scene, self.scene.source
         if source is None or not scene.sensors:
             if scene.arm is None:  # there is nothing to examine at all
-                self._note(
+                self.note(
                     *(
                         Finding("scene", "bad", line, "", "add it, or see coneskin init")
                         for line in missing_parts(scene)
                     )
                 )
-            self._note(Finding("skin", "not tried", "the scene has no [source], or no sensor"))
+            self.note(Finding("skin", "not tried", "the scene has no [source], or no sensor"))
             return
-        self._note(*_port(source))
+        self.note(*_port(source))
         with ExitStack() as stack:
             port, client = "", None
             try:
@@ -118,15 +119,15 @@ class Doctor:
                     port = client.port()
                 opened = stack.enter_context(open_source(source.kind, source.settings, port))
             except ConeSkinError as exc:
-                self._note(Finding("skin, port", "bad", str(exc), "it can be opened"))
-                self._note(*(Finding(item, "not tried", "no port") for item in ("skin, frames", "skin, wires")))
+                self.note(Finding("skin, port", "bad", str(exc), "it can be opened"))
+                self.note(*(Finding(item, "not tried", "no port") for item in ("skin, frames", "skin, wires")))
                 return
             if getattr(opened, "low_latency", None) is not None:
-                self._note(_latency_timer(source, opened))
+                self.note(_latency_timer(source, opened))
             try:
                 self.examine_skin(opened, source.settings, client)
             except SkinConnectionError as exc:
-                self._note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
+                self.note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
 
     def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: _Toucher | None = None) -> None:
         """Examine what an open source sends, untouched and touched.
@@ -143,21 +144,21 @@ class Doctor:
         self._ask("do not touch the skin")
         _collect(source, _START_TIME, self._clock)  # a device that starts with its port, and what has piled up
         seen = _collect(source, _LISTEN_TIME, self._clock)
-        self._note(*examine_line(seen, sensors, settings, self._clock()))
+        self.note(*examine_line(seen, sensors, settings, self._clock()))
         limits = self.scene.monitoring_limits
         for sensor in sensors:
             statistics = seen.sensors.get((sensor.device_id, sensor.sensor_id))
             if statistics is None:
-                self._note(Finding(f"{sensor.name}, wires", "not tried", "it sends nothing"))
+                self.note(Finding(f"{sensor.name}, wires", "not tried", "it sends nothing"))
                 continue
-            self._note(*examine_sensor(sensor, statistics, limits.clock_drift, limits.skin_silence))
+            self.note(*examine_sensor(sensor, statistics, limits.clock_drift, limits.skin_silence))
             self._examine_wires(source, sensor, statistics, toucher)
 
     def _examine_wires(
         self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: _Toucher | None
     ) -> None:
         if not self._touches:
-            self._note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
+            self.note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
             return
 
         def tell(notice: Notice, mark: Mark | None) -> None:
@@ -171,20 +172,18 @@ class Doctor:
         touched = guided_touches(source, sensor, tell, _TOUCH_TIMEOUT, self._clock, kept.append)
         if touched is None:
             why = f"no touch that rests came within {_TOUCH_TIMEOUT:g} s"
-            self._note(
-                Finding(f"{sensor.name}, wires", "not tried", why, "", "a touch must change its readings by 4 %")
-            )
+            self.note(Finding(f"{sensor.name}, wires", "not tried", why, "", "a touch must change its readings by 4 %"))
             return
         finding, patch = examine_wires(sensor, touched)
-        self._note(finding)
+        self.note(finding)
         if patch is not None:
             self.patches.append(patch)
         if finding.verdict == "ok":
-            self._note(
+            self.note(
                 examine_touches(sensor, [frame for _, frame in untouched.frames], kept, 1.0 / untouched.numbers().rate)
             )
         else:
-            self._note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
+            self.note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
 
 
 def _packages(scene: Scene) -> Iterator[Finding]:

@@ -48,7 +48,7 @@ MAX_ROWS = 20_000  #: of a table of permissible speeds
 
 ARM_KEYS = with_meanings(
     """
-    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR10e, UR16e, UR20 or UR30; case, spaces and hyphens do not matter
+    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR10e, UR12e, UR15, UR16e, UR18, UR20 or UR30, in any spelling
     host: name or address of the controller
     watchdog_hz: the controller ends the program through which coneskin moves the arm when it receives nothing for 1
         / `watchdog_hz`

@@ -56,6 +56,40 @@ def test_two_threads_that_move_the_arm_end_the_program(bench: Bench) -> None:
     assert not bench.controller.arm.moving
 
 
+def test_a_cb3_turns_its_programs_each_8_ms(bench: Bench) -> None:
+    old = Bench(version=(3, 15))
+    for made in (old, bench):
+        made.send("def p():\n  write_output_float_register(0, get_steptime())\n  sleep(0.4)\nend\n")
+        made.step(120)
+        assert made.controller.runtime.name == "PLAYING"
+        made.step(100)
+        assert made.controller.runtime.name == "STOPPED"
+    assert (old.controller.output_doubles[0], bench.controller.output_doubles[0]) == (0.008, 0.002)
+
+
+def test_a_slider_that_is_raised_from_0_under_a_motion_gives_a_protective_stop(bench: Bench) -> None:
+    def slide(fraction: float) -> str:
+        bench.controller.write_inputs({"speed_slider_mask": 1, "speed_slider_fraction": fraction})
+        return bench.controller.safety.name
+
+    assert (slide(0.0), slide(1.0)) == ("NORMAL", "NORMAL")  # no program runs
+    bench.send(f"def user():\n  movej({FAR}, a=5, v=1)\nend\n")
+    bench.step(100)
+    assert (slide(0.5), slide(1.0), slide(0.0)) == ("NORMAL",) * 3
+    bench.step(200)
+    assert not bench.controller.arm.moving
+    assert slide(0.5) == "PROTECTIVE_STOP"
+
+
+def test_a_protective_stop_can_be_unlocked_after_5_s_of_the_clock_and_not_of_cycles(bench: Bench) -> None:
+    bench.controller.protective_stop("test")
+    bench.step(10)
+    assert not bench.controller.unlock()
+    bench.controller.hold_up(5.0)
+    assert bench.controller.unlock()
+    assert bench.events("held_up")[0]["seconds"] == 5.0
+
+
 def test_killing_the_thread_that_moves_makes_the_arm_brake(bench: Bench) -> None:
     bench.send(
         f"def p():\n  thread t():\n    movej({FAR}, a=5, v=1)\n  end\n  m = run t()\n  sleep(0.3)\n  kill m\n"

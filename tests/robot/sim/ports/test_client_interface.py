@@ -20,6 +20,7 @@ from coneskin.robot.sim.machine.states import (
     TextNotice,
 )
 from coneskin.robot.sim.ports.client_interface import (
+    ScriptPort,
     _encode_first_state,
     _encode_notice,
     _encode_realtime,
@@ -65,6 +66,19 @@ def test_an_error_has_its_code_and_its_gravity():
     made = _encode_notice(1.5, ErrorNotice(153, 2, Report.VIOLATION, "text"))
     assert struct.unpack(">iBQBBiiiII", made[:35]) == (39, 20, 1_500_000, 253, 6, 153, 2, 3, 0, 0)
     assert made[35:] == b"text"
+
+
+def test_a_connection_that_was_opened_in_local_control_says_c210_and_stays_read_only():
+    ran, controller = [], Controller(Options(remote_control=False))
+    primary = ScriptPort(controller, ran.append, messages=True)
+    secondary = ScriptPort(controller, ran.append)
+    for remote in (False, True):
+        controller.switch_control(remote)
+        assert struct.unpack(">iBQBBi", primary(b"stopj(2)\n")[:19])[-2:] == (6, 210)
+        assert secondary(b"stopj(2)\n") == b""
+    assert ran == []
+    assert ScriptPort(controller, ran.append, messages=True)(b"stopj(2)\n") == b""
+    assert ran == ["stopj(2)\n"]
 
 
 def test_text_and_popup_keep_letters_of_any_language():

@@ -123,6 +123,26 @@ def test_an_input_has_one_owner() -> None:
     assert ask(second, wanted) == b"\x02INT32,INT32"
 
 
+def test_a_fieldbus_holds_the_lower_half_of_the_registers() -> None:
+    connection = session(Controller(Options(fieldbus=True)))
+    lower, upper = (pack_inputs_request((f"input_int_register_{number}",)) for number in (23, 24))
+    assert ask(connection, lower) == b"\x00IN_USE"
+    assert ask(connection, upper) == b"\x01INT32"
+
+
+def test_a_cb3_sends_at_most_125_times_a_second() -> None:
+    controller = Controller(Options(version=(3, 15)))
+    connection = session(controller)
+    for frequency, wanted in ((500.0, 25), (125.0, 25), (50.0, 12)):  # in 0.2 s; of 50 Hz there is 62.5
+        ask(connection, pack_outputs_request(("timestamp",), frequency))
+        ask(connection, pack(PacketKind.START))
+        sent = 0
+        for _ in range(100):
+            controller.update()
+            sent += bool(connection.outputs())
+        assert sent == wanted
+
+
 def test_inputs_work_without_start_and_masks_choose_the_bits() -> None:
     controller = Controller(Options())
     connection = session(controller)

@@ -1,0 +1,110 @@
+"""What scripts/measure_controller.py has measured on one controller: read from its file, and compared with a scene.
+
+A guard assumes that a program starts within ``escalate_ms``, that the arm brakes as it is told, and that the
+controller's watchdog ends a program soon after its period. Where that does not hold, each finding names the key to set.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from coneskin.core.errors import RobotRefused
+from coneskin.core.files import read_file
+from coneskin.core.finding import Finding
+from coneskin.core.text import read_json
+from coneskin.robot.stop.limits import MonitoringLimits
+
+__all__ = ["MEASURED_DECELERATION", "MeasuredController", "compare", "read_measured"]
+
+_MAX_SIZE = 1 << 20  # bytes
+_MARGIN = 1.2  # times what was measured, for a limit that shall hold
+MEASURED_DECELERATION = 10.0  #: rad/s2 of the stops by program that the script measures
+_WATCHDOG_LATENESS = 0.02  # s, that the simulated controller's never reaches
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredController:
+    """Times of one controller.
+
+    Attributes:
+        what: model, version and date.
+        start: p50 and p95 of a program's last byte to its first cycle [s].
+        watchdog: p50 and worst of the time from the end of a watchdog's period to the end of the program [s].
+        deceleration: of the leading joint, where a program is ended [rad/s2]; 0 where it was not measured.
+        stops: path, motion, speed [rad/s] and worst time until the arm stood [s], of each kind of stop of a joint.
+        slows: worst time until a stop by program or command showed [s]; 0 where none was measured.
+    """
+
+    what: str
+    start: tuple[float, float]
+    watchdog: tuple[float, float]
+    deceleration: float
+    stops: tuple[tuple[str, str, float, float], ...]
+    slows: float
+
+
+def read_measured(path: Path) -> MeasuredController:
+    """Read the file of scripts/measure_controller.py.
+
+    Raises:
+        RobotRefused: it cannot be read, or is not one.
+    """
+    try:
+        facts: Any = read_json(read_file(path, _MAX_SIZE))
+        joints = [stop for stop in facts["stops"] if stop["joint"] is not None]
+        ended = [stop for stop in joints if stop["path"] == "command"]
+        ways = [stop["way_rad"]["p50"] - stop["speed"] * stop["slows_s"]["p50"] for stop in ended]
+        rates = [stop["speed"] ** 2 / (2.0 * way) for stop, way in zip(ended, ways, strict=True) if way > 0.0]
+        found = MeasuredController(
+            f"{facts['model']}, {facts['version']}, {facts['date']}",
+            (float(facts["start_s"]["p50"]), float(facts["start_s"]["p95"])),
+            (float(facts["watchdog_s"]["p50"]), float(facts["watchdog_s"]["worst"])),
+            float(median(rates)) if rates else 0.0,
+            tuple((s["path"], s["motion"], float(s["speed"]), float(s["stands_s"]["worst"])) for s in joints),
+            max((float(s["slows_s"]["worst"]) for s in joints if s["path"] != "slider"), default=0.0),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as exc:
+        raise RobotRefused(
+            f"{path} is no file of scripts/measure_controller.py: {type(exc).__name__}: {exc}; measure again"
+        ) from exc
+    numbers = (*found.start, *found.watchdog, found.deceleration, found.slows)
+    if not all(math.isfinite(number) for number in numbers):
+        raise RobotRefused(f"{path} has times that are not finite; measure again")
+    return found
+
+
+def compare(measured: MeasuredController, limits: MonitoringLimits) -> list[Finding]:
+    """Return what a guard's limits must be with a controller as it was measured.
+
+    Args:
+        measured: the controller.
+        limits: of the guard.
+    """
+    start, escalate = measured.start[1], limits.escalate
+    found = [Finding("measured, controller", "ok", measured.what)]
+    needed = math.ceil(1e3 * _MARGIN * max(start, measured.slows))
+    fits = max(start, measured.slows) <= escalate
+    value = (
+        f"a program starts after {1e3 * start:.0f} ms (p95), a stop shows after {1e3 * measured.slows:.0f} ms (worst)"
+    )
+    remedy = "" if fits else f"escalate_ms = {needed} in [monitoring]; else each stop goes on to the next path"
+    found.append(
+        Finding("measured, start of a program", "ok" if fits else "bad", value, f"{1e3 * escalate:g} ms", remedy)
+    )
+    late = measured.watchdog[1]
+    fits = late <= _WATCHDOG_LATENESS
+    value = f"it ends a program {1e3 * late:.0f} ms after its period (worst)"
+    remedy = "" if fits else "a program without its guard goes on for so much longer: raise watchdog_hz by it"
+    rule = f"{1e3 * _WATCHDOG_LATENESS:g} ms"
+    found.append(Finding("measured, watchdog", "ok" if fits else "warning", value, rule, remedy))
+    for path, motion, speed, stood in measured.stops:
+        budget = limits.stop_budget(speed, MEASURED_DECELERATION)
+        if path != "slider" and stood > budget:
+            value = f"{path} stops {motion} from {speed:.2f} rad/s in {1e3 * stood:.0f} ms (worst)"
+            remedy = f"deceleration_rad_s2 = {0.8 * speed / max(stood - 4.0 * escalate, 1e-3):.1f}, or a lower speed"
+            found.append(Finding("measured, stop", "warning", value, f"{1e3 * budget:.0f} ms", remedy))
+    return found
