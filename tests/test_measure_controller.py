@@ -9,7 +9,8 @@ import pytest
 
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.ur.measured import compare, read_measured
+from coneskin.robot.ur import measured
+from coneskin.robot.ur.measured import read_measured
 from tests.support.paths import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated controller needs several addresses")
@@ -104,6 +105,10 @@ def test_an_arm_that_does_not_move_is_no_measurement(tmp_path):
         assert done.returncode == 1
         assert "did not" in done.stderr
         assert not json.loads((tmp_path / "m.json").read_text())["complete"]
+
+
+def compare(found, limits):
+    return measured.compare(found, limits.escalate, limits.stop_budget)
 
 
 def facts(**change):

@@ -34,7 +34,7 @@ _REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
 _DASHBOARD_PORT, _SCRIPT_PORT = 29999, 30003  # TCP ports
 _LISTEN_TIME = 1.0  # s of states
 _MAX_LATENESS, _MAX_GAP = 1.25, 0.025  # times the control cycle, of the median between two states; s, of the longest
-_CB3 = 3  # major version of its software, which has a cycle of 8 ms and no local control
+_CB3_MAJOR = 3  # major version of its software, which has a cycle of 8 ms and no local control
 _CONTROL_INPUTS = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
 _FREE_REMEDY = (
     "end the other program; or disable EtherNet/IP, PROFINET and MODBUS in the controller's Installation, Fieldbus"
@@ -63,7 +63,7 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
             *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
         ]
     found += _tried("arm, model", lambda: _model(arm, host))
-    found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3 else 0.002)))
+    found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3_MAJOR else 0.002)))
     found += _dashboard(host, major)
     found += _port("arm, script port", host, _SCRIPT_PORT)
     if not any(finding.verdict == "bad" for finding in found[-3:]):
@@ -157,7 +157,7 @@ def _dashboard(host: str, major: int) -> list[Finding]:
         return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
     version, remote = answers
     found = [Finding(item, "ok", version or "it answers")]
-    if major == _CB3:
+    if major == _CB3_MAJOR:
         return found
     if "true" in remote.lower():
         return [*found, Finding("arm, remote control", "ok", "it is in remote control")]

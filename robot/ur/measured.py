@@ -7,6 +7,7 @@ controller's watchdog ends a program soon after its period. Where that does not 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -16,12 +17,11 @@ from coneskin.core.errors import RobotRefused
 from coneskin.core.files import read_file
 from coneskin.core.finding import Finding
 from coneskin.core.text import read_json
-from coneskin.robot.stop.limits import MonitoringLimits
 
 __all__ = ["MEASURED_DECELERATION", "MeasuredController", "compare", "read_measured"]
 
 _MAX_SIZE = 1 << 20  # bytes
-_MARGIN = 1.2  # times what was measured, for a limit that shall hold
+_LIMIT_MARGIN = 1.2  # times what was measured, for a limit that shall hold
 MEASURED_DECELERATION = 10.0  #: rad/s2 of the stops by program that the script measures
 _WATCHDOG_LATENESS = 0.02  # s, that the simulated controller's never reaches
 
@@ -77,16 +77,19 @@ def read_measured(path: Path) -> MeasuredController:
     return found
 
 
-def compare(measured: MeasuredController, limits: MonitoringLimits) -> list[Finding]:
+def compare(
+    measured: MeasuredController, escalate: float, stop_budget: Callable[[float, float], float]
+) -> list[Finding]:
     """Return what a guard's limits must be with a controller as it was measured.
 
     Args:
         measured: the controller.
-        limits: of the guard.
+        escalate: time after which a guard goes on to the next stop path [s].
+        stop_budget: returns the time that it gives a stop [s], of a speed [rad/s] and a deceleration [rad/s2].
     """
-    start, escalate = measured.start[1], limits.escalate
+    start = measured.start[1]
     found = [Finding("measured, controller", "ok", measured.what)]
-    needed = math.ceil(1e3 * _MARGIN * max(start, measured.slows))
+    needed = math.ceil(1e3 * _LIMIT_MARGIN * max(start, measured.slows))
     fits = max(start, measured.slows) <= escalate
     value = (
         f"a program starts after {1e3 * start:.0f} ms (p95), a stop shows after {1e3 * measured.slows:.0f} ms (worst)"
@@ -102,7 +105,7 @@ def compare(measured: MeasuredController, limits: MonitoringLimits) -> list[Find
     rule = f"{1e3 * _WATCHDOG_LATENESS:g} ms"
     found.append(Finding("measured, watchdog", "ok" if fits else "warning", value, rule, remedy))
     for path, motion, speed, stood in measured.stops:
-        budget = limits.stop_budget(speed, MEASURED_DECELERATION)
+        budget = stop_budget(speed, MEASURED_DECELERATION)
         if path != "slider" and stood > budget:
             value = f"{path} stops {motion} from {speed:.2f} rad/s in {1e3 * stood:.0f} ms (worst)"
             remedy = f"deceleration_rad_s2 = {0.8 * speed / max(stood - 4.0 * escalate, 1e-3):.1f}, or a lower speed"

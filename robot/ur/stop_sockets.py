@@ -48,8 +48,8 @@ _PROOF_REGISTER = 47  # integer output register
 _PROOF_REPEAT = 0.25  # s after which the program is sent again: another guard may have written the register meanwhile
 _PROOF_FREQUENCY = 125.0  # Hz
 _ARM_RUNNING = 7  # value of robot_mode
-_QUESTION = b"is in remote control\n"
-_REFUSAL = b"command is not allowed"  # begins the dashboard's answer to a command in local control
+_MODE_QUESTION = b"is in remote control\n"
+_LOCAL_REFUSAL = b"command is not allowed"  # begins the dashboard's answer to a command in local control
 _LOCAL_CONTROL = (
     "is in local control: it refuses every stop by program or command. Choose Remote Control at the top right of the "
     "pendant, then start again"
@@ -120,7 +120,7 @@ class StopSockets:
 
     def ask(self) -> None:
         """Ask the dashboard whether the controller still takes stops, without waiting; ``drain`` takes its answer."""
-        self._send("command", _QUESTION)
+        self._send("command", _MODE_QUESTION)
 
     def drain(self) -> list[tuple[str, socket.socket, str]]:
         """Take what the controller has sent, at most 64 kB a call and socket, without waiting.
@@ -149,14 +149,14 @@ class StopSockets:
         """Take what the dashboard has said; tell whether that is the answer of local control."""
         *lines, self._said = (self._said + data).split(b"\n")
         self._said = self._said[-_MAX_ANSWER:]
-        return any(line.strip().lower() == b"false" or line.lower().startswith(_REFUSAL) for line in lines)
+        return any(line.strip().lower() == b"false" or line.lower().startswith(_LOCAL_REFUSAL) for line in lines)
 
     def _prove_remote(self, sock: socket.socket) -> None:
         """Wait for the dashboard's answer: a connection alone proves no stop."""
         sock.settimeout(self._timeout)
         answers: list[bytes] = []
         try:
-            sock.sendall(_QUESTION)
+            sock.sendall(_MODE_QUESTION)
             with sock.makefile("rb") as lines:
                 while len(answers) < 2 and (line := lines.readline(_MAX_ANSWER)):  # its welcome is the first
                     answers.append(line.strip())

@@ -81,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if args.measured:
         from coneskin.robot.ur.measured import compare, read_measured
 
-        doctor.note(*compare(read_measured(args.measured), scene.monitoring_limits))
+        limits = scene.monitoring_limits
+        doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget))
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
     code = exit_code(doctor.findings)

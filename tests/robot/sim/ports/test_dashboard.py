@@ -181,10 +181,12 @@ def first_version(command: str, major: int) -> str:
 
 
 def page_table() -> str:
-    """The page's list of commands, each with the first version of e-Series and of CB3 that has it."""
-    lines = ["| dashboard command | e-Series since | CB3 since |", "|---|---|---|"]
+    """The page's list of commands by the first versions of e-Series and of CB3 that have them."""
+    groups: dict[tuple[str, str], list[str]] = {}
     for command in Console().dashboard.commands:
-        lines.append(f"| `{command}` | {first_version(command, 5) or '-'} | {first_version(command, 3) or '-'} |")
+        groups.setdefault((first_version(command, 5) or "-", first_version(command, 3) or "-"), []).append(command)
+    lines = ["|e-Series since|CB3 since|dashboard commands|", "|---|---|---|"]
+    lines += [f"|{new}|{old}|{', '.join(f'`{one}`' for one in groups[new, old])}|" for new, old in sorted(groups)]
     return "\n".join(lines)
 
 
