@@ -34,6 +34,7 @@ BENCHES = {
         "States that differ in a time or a number only: of each abstract state one is followed.",
     ),
     "processes": Bench("bench.loop.processes", "A real controller, which sends as much, and a real port."),
+    "busy": Bench("bench.loop.busy", "A real controller and a real skin, which this computer does not hold up."),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),
     "start": Bench("bench.loop.start", "A real controller, and a port of a real skin."),
     "endurance": Bench("bench.loop.endurance", "Sockets, the disk and ur_rtde: frames come from memory."),

@@ -269,13 +269,27 @@ def proof_table() -> str:
     return "\n".join(rows) + "\n"
 
 
+def liveness_table() -> str:
+    """Return the table of who misses whom."""
+    from coneskin.robot.driver.liveness import LIVENESS
+
+    def limit(value: float | str) -> str:
+        return f"{value:g} s" if isinstance(value, float) else f"`{value}`"
+
+    rows = [f"| {row.who} | {row.heard_by} | {row.sign} | {limit(row.limit)} | {row.follows} |" for row in LIVENESS]
+    return (
+        "\n".join(["| silent | missed by | sign of life | limit | who misses it |", "|---|---|---|---|---|", *rows])
+        + "\n"
+    )
+
+
 #: page -> name of a generated part -> what makes it
 PARTS: dict[str, dict[str, Callable[[], str]]] = {
     "scene.md": {},
     "events.md": {"events": event_table},
     "commands.md": {"commands": command_table},
     "public-names.md": {"names": name_table},
-    "promises.md": {"proofs": proof_table},
+    "promises.md": {"proofs": proof_table, "liveness": liveness_table},
 }
 
 #: what is a page of the site alone, or is printed: name -> what makes it

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
+from coneskin.robot.driver.liveness import GUARD_SILENCE
 from coneskin.testing.scenes import ESCALATE
 
 from .kind import (
@@ -34,7 +34,7 @@ from .trial import Trial
 PROCESS_KINDS = (
     # the processes
     FaultKind("guard killed", kill("guard")),
-    FaultKind("guard frozen", halt("guard"), HEARTBEAT_TIMEOUT, after=Trial.thaw_all),
+    FaultKind("guard frozen", halt("guard"), GUARD_SILENCE, after=Trial.thaw_all),
     FaultKind("guard told to end", end("guard")),
     FaultKind("driver killed", kill("driver"), controls=INTERNAL),
     FaultKind("driver frozen", halt("driver"), WATCHDOG_TIME, controls=INTERNAL, after=Trial.thaw_all),

@@ -5,7 +5,7 @@ Whatever the arm does, the surface must not go towards a contact by much more th
 
 from __future__ import annotations
 
-from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
+from coneskin.robot.driver.liveness import GUARD_SILENCE
 
 from .kind import (
     DEVIATION_TIME,
@@ -101,7 +101,7 @@ REACTION_KINDS = (
     away("protective stop", says("protective stop"), variant=True),
     # while it goes on slowly under a touch
     slow("guard killed", kill("guard")),
-    slow("guard frozen", halt("guard"), HEARTBEAT_TIMEOUT, after=Trial.thaw_all),
+    slow("guard frozen", halt("guard"), GUARD_SILENCE, after=Trial.thaw_all),
     slow("driver killed", kill("driver"), WATCHDOG_TIME, controls=INTERNAL, variant=True),
     slow("driver frozen", halt("driver"), WATCHDOG_TIME, controls=INTERNAL, after=Trial.thaw_all, variant=True),
     slow("skin unplugged", unplug),

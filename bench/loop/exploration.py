@@ -1,4 +1,4 @@
-"""Exploration of the guard to the end of its states, and of the four processes around it.
+"""Exploration of the guard to the end of its states, and of the processes around it.
 
     python -m bench exploration [--wrong 1] [--compiled]
 
@@ -24,7 +24,7 @@ from tests.support.exploration.process_world import PROCESS_INVARIANTS, Parts, P
 ROOT = Path(__file__).parents[2]
 COLUMNS = ["states", "steps", "depth", "closed", "invariants", "broken", "seconds"]
 #: silences that somebody listens for: without each of them the arm goes on
-PARTS = ("program_silence", "process_silence", "guard_silence", "session_silence", "watchdog")
+PARTS = ("program_silence", "process_silence", "guard_silence", "second_silence", "watchdog")
 
 
 def row(name: str, found: Exploration, invariants: int) -> list[str]:
@@ -58,7 +58,7 @@ def explore_processes() -> bool:
         for part in PARTS:
             without = explore(ProcessWorld(control, Parts(**{**parts, part: math.inf})), PROGRESS, stop_at_first=True)
             needed.append([name, part, ", ".join(without.broken) or "nothing"])
-    show("The four processes", ["control", *COLUMNS], rows)
+    show("The processes", ["control", *COLUMNS], rows)
     show("What breaks where nobody listens any more", ["control", "without", "breaks"], needed)
     return whole
 

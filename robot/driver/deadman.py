@@ -18,7 +18,8 @@ from typing import Self
 
 from coneskin.core.channel import Channel
 
-from .messages import REPORT_PERIOD, StatusReport
+from .liveness import BEAT_PERIOD
+from .messages import StatusReport
 
 __all__ = ["Deadman"]
 
@@ -93,7 +94,7 @@ class Deadman:
             self._end()
 
     def _run(self) -> None:
-        while not self._closed.wait(REPORT_PERIOD):
+        while not self._closed.wait(BEAT_PERIOD):
             if (now := self._clock()) - self._lock_timer_at >= _LOCK_PERIOD:
                 self._lock_timer_at = now
                 self._limit_lock(self._lock_timeout)

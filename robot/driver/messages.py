@@ -11,10 +11,7 @@ from typing import NamedTuple
 from coneskin.robot.arm.model import Joints
 
 __all__ = [
-    "HEARTBEAT_PERIOD",
-    "HEARTBEAT_TIMEOUT",
-    "REPORT_PERIOD",
-    "SETPOINT_TIMEOUT",
+    "LEAVE",
     "EndReaction",
     "GuardCommand",
     "Heartbeat",
@@ -26,10 +23,7 @@ __all__ = [
     "decode_command",
 ]
 
-HEARTBEAT_PERIOD = 0.05  #: s between two heartbeats of the guard
-REPORT_PERIOD = 0.03  #: s between two of the driver process, the guard watchdog, or the program that guards
-HEARTBEAT_TIMEOUT = 0.5  #: s without one after which the guard counts as dead; delays of 0.1 s occur under load
-SETPOINT_TIMEOUT = 0.1  #: s without a ``SetJointVelocity``, sent every 4 ms while the guard itself moves the arm
+LEAVE = b"leave"  #: of the guarded program to a guard watchdog: it ends, and still listens
 
 _ONE_DOUBLE = struct.Struct("<d")
 _SEVEN_DOUBLES = struct.Struct("<7d")
@@ -95,7 +89,7 @@ class Release(NamedTuple):
 
 
 class Heartbeat(NamedTuple):
-    """Heartbeat of the guard, every ``HEARTBEAT_PERIOD``; without it for ``HEARTBEAT_TIMEOUT`` the arm is stopped."""
+    """Heartbeat of the guard, every ``BEAT_PERIOD``; without it for ``GUARD_SILENCE`` the arm is stopped."""
 
     def encode(self) -> bytes:
         """Return the message."""
@@ -118,7 +112,7 @@ class StatusReport(NamedTuple):
     """Report of the driver process, or of the guard watchdog, to the guard.
 
     Attributes:
-        kind: "alive", every ``REPORT_PERIOD``; "ready"; "done" (a stop or the end of a reaction returned);
+        kind: "alive", every ``BEAT_PERIOD``; "ready"; "done" (a stop or the end of a reaction returned);
             "released", with the number of the release; "restarts" and "restarted" around an end of the driver's program
             on the controller that is meant; "remark"; "error".
         text: more, for a person.

@@ -267,8 +267,14 @@ class ArmSupervisor:
             stop.insist(state, self._reaction.deceleration, out)
             self._latch(state, out)
 
-    def poll(self, now: float, out: Outputs) -> None:
-        """Decide what only the passing of time shows."""
+    def poll(self, now: float, fair: float, out: Outputs) -> None:
+        """Decide what only the passing of time shows.
+
+        Args:
+            now: host time [s].
+            fair: the same, without what the guard itself was held up [s].
+            out: takes commands and events.
+        """
         stop, phase = self._stop, self.supervision.phase
         if phase.brakes:
             stop.escalate(now, self._reaction.deceleration, self.state, out)
@@ -282,7 +288,7 @@ class ArmSupervisor:
                 self._follow(now, Cue.FREED, "", out)
                 self.speed_reduction.put_back(now, out)
                 emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)
-        elif phase.stands and self.state_age.silent(now):
+        elif phase.stands and self.state_age.silent(fair):
             self._follow(now, Cue.MOVED, "the controller fell silent", out)
 
     # ---- what it does

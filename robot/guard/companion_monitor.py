@@ -1,7 +1,7 @@
 """Monitor of the processes beside a guard: the program that guards, and driver process or guard watchdog. Pure.
 
-Each is needed for a stop, or moves the arm. It is missed where it dies, where its heartbeat stays away, and where the
-program that it runs on the controller ends.
+Each is needed for a stop, or moves the arm. It is missed where it dies, where it falls silent (``liveness``), and where
+the program that it runs on the controller ends.
 """
 
 from __future__ import annotations
@@ -10,22 +10,42 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final
 
+from coneskin.robot.driver.liveness import BEAT_PERIOD, HOLD_UP_LIMIT
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop.limits import MonitoringLimits
 
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["CompanionMonitor"]
+__all__ = ["CompanionMonitor", "StallClock"]
 
 _MIN_STALL: Final = 0.02  # s between two looks, from which on the guard itself was held up
 
 
-class _HeartbeatMonitor:
-    """Ages of the heartbeats of several processes.
+class StallClock:
+    """Clock on which the guard's own hold-ups are nobody's silence.
 
-    While the guard itself is held up it hears nobody: that time is nobody's silence. What came meanwhile is read next.
-    So only the longest time counts, not the sum: a guard that is held up again and again reads in between.
+    While the guard is held up it hears nobody. What came meanwhile is read next, one input after the other. So for as
+    long again the longest hold-up is taken off every silence, and not the sum: a guard that is held up again and again
+    reads in between.
+    """
+
+    def __init__(self) -> None:
+        self._looked = -math.inf
+        self._longest = 0.0  # [s]
+        self._until = -math.inf  # when it counts no more
+
+    def fair(self, now: float) -> float:
+        """Return the time by which silences are judged at a host time [s]. To be asked continuously."""
+        stall, self._looked = now - self._looked, now
+        if _MIN_STALL < stall < math.inf:
+            self._longest = stall if now >= self._until else max(stall, self._longest)
+            self._until = now + self._longest
+        return now - self._longest if now < self._until else now
+
+
+class _Heartbeats:
+    """Ages of the signs of life of several processes.
 
     Args:
         limits: longest silence of each process [s], by its name. One that is not named is not monitored.
@@ -34,37 +54,54 @@ class _HeartbeatMonitor:
     def __init__(self, limits: Mapping[str, float]) -> None:
         self._limits = dict(limits)
         self._heard: dict[str, float] = {}
-        self._held_up: dict[str, float] = {}  # the longest time, since then [s]
-        self._looked: float | None = None
+        self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
 
     def feed(self, process: str, now: float) -> None:
-        """Note a heartbeat at a host time [s]."""
-        self._heard[process], self._held_up[process] = now, 0.0
+        """Note a sign of life at a host time [s]."""
+        self._heard[process] = now
+        self._held_up.pop(process, None)
+
+    def hold_up(self, process: str, now: float, what: str) -> bool:
+        """Note that this computer does not let a process run. Return whether that is new since it was heard."""
+        new = process not in self._held_up
+        self._held_up[process] = now, what
+        return new
 
     def forget(self, process: str) -> None:
         """Monitor a process no longer: it is known to be gone."""
         self._limits.pop(process, None)
 
     def silent(self, now: float) -> dict[str, str]:
-        """Return what is wrong with each process that is silent. Empty where all are heard. To be asked continuously.
+        """Return what is wrong with each process that is silent. Empty where all are heard.
 
         Args:
-            now: host time [s].
+            now: host time on the ``StallClock`` [s].
         """
-        if self._looked is not None and (held_up := now - self._looked) > _MIN_STALL:
-            self._held_up = {process: max(held_up, longest) for process, longest in self._held_up.items()}
-        self._looked = now
         found = {}
         for process, limit in self._limits.items():
             heard = self._heard.get(process)
             if heard is None:
-                found[process] = f"{process}: no heartbeat yet"
-            elif now - heard - self._held_up[process] > limit:
-                found[process] = f"{process}: no heartbeat for {1e3 * limit:.0f} ms: it hangs, or is frozen"
+                found[process] = f"{process}: no sign of life yet"
+                continue
+            since, what = self._held_up.get(process, (-math.inf, ""))
+            waits = now - since <= _LOOK_TIME
+            if now - heard > (max(limit, HOLD_UP_LIMIT) if waits else limit):
+                found[process] = f"{process}: {what if waits else _SILENT_WORDS[process == _USER_PROGRAM]}".format(
+                    1e3 * max(limit, HOLD_UP_LIMIT) if waits else 1e3 * limit
+                )
         return found
 
 
 _USER_PROGRAM = "the program that guards"
+#: what is wrong with a helper that is silent, and with a program
+_SILENT_WORDS = (
+    "no heartbeat for {:.0f} ms: it hangs, or is frozen",
+    "it was suspended for {:.0f} ms, by Ctrl-Z, a signal or a debugger",
+)
+_HELD_UP_WORDS = (
+    "no heartbeat for {:.0f} ms: this computer holds it up (%s). End what else runs, or see `coneskin doctor`"
+)
+_LOOK_TIME: Final = 3.0 * BEAT_PERIOD  # s for which it counts that a process was seen waiting
 _RESTART_TIMEOUT: Final = 5.0  # s for the driver's program to run again after an announced end
 #: process that can be lost -> the stop path that goes with it; the driver knows those of its connections
 _LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
@@ -85,7 +122,7 @@ class CompanionMonitor:
         self._arm = arm
         self._helper = "the guard watchdog" if arm is None or not arm.internal_control else "the driver process"
         silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
-        self._heartbeats = _HeartbeatMonitor(silences)
+        self._heartbeats = _Heartbeats(silences)
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
         self._restart_end = math.inf  # by when it has to run again, after an announced end
@@ -96,12 +133,25 @@ class CompanionMonitor:
         return self._silent.values()
 
     def hear_program(self, now: float) -> None:
-        """Note a heartbeat of the program that guards, at a host time [s]."""
+        """Note that the program that guards is not suspended, at a host time [s]."""
         self._heartbeats.feed(_USER_PROGRAM, now)
 
     def hear_helper(self, now: float) -> None:
         """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""
         self._heartbeats.feed(self._helper, now)
+
+    def hold_up_helper(self, now: float, load: str) -> str:
+        """Note that this computer does not let the driver process, or the guard watchdog, run at a host time [s].
+
+        Args:
+            now: host time [s].
+            load: how busy the computer is, in words.
+
+        Returns:
+            a remark for people. Empty after the first since it was heard.
+        """
+        new = self._heartbeats.hold_up(self._helper, now, _HELD_UP_WORDS % load)
+        return f"{self._helper} waits for a processor ({load}): it may do so for {HOLD_UP_LIMIT:g} s" if new else ""
 
     def doubt_driver(self, now: float) -> None:
         """Let the stop under way not count on the driver process, which has reported an error."""
@@ -147,7 +197,7 @@ class CompanionMonitor:
         """Return each process that has fallen silent since the last look: why, and what a stop must not count on.
 
         Args:
-            now: host time [s].
+            now: host time on the ``StallClock`` [s].
         """
         before, self._silent = self._silent, self._heartbeats.silent(now)
         if not self._silent:

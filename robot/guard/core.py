@@ -25,7 +25,7 @@ from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, Tou
 from coneskin.skin.detection.stream import TouchStream
 
 from .activation import Activation, ActivationStep, ControllerNeeds
-from .companion_monitor import CompanionMonitor
+from .companion_monitor import CompanionMonitor, StallClock
 from .phase import Phase
 from .signals.contact import Contact, GuardedSensor
 from .signals.journal import BlockKind, EventName, Outputs, decode_loss, emit
@@ -139,6 +139,8 @@ class GuardCore:
         self._phase = Phase.STARTING
         self._folding = _EventFolding()
         self._companions = CompanionMonitor(limits, arm)
+        self._clock = StallClock()
+        self._fair = 0.0  # host time of this input, on that clock [s]
         self._activation = Activation(limits.settle)
         self._faults: dict[str, str] = {}  # since the last reset: kind -> what is wrong
         self._lost: dict[str, str] = {}  # port that is gone -> why
@@ -155,6 +157,7 @@ class GuardCore:
             BlockKind.RESET: self._reset,
             BlockKind.LOST: self._lose,
             BlockKind.PROGRAM: self._feed_program,
+            BlockKind.HELD_UP: self._feed_hold_up,
             BlockKind.ABSENT: self._miss,
             BlockKind.SUSPENDED: self._suspend,
             BlockKind.REOPENED: self._reopen,
@@ -182,6 +185,7 @@ class GuardCore:
             out: takes commands and events as soon as they are decided. A command comes before the event that explains
                 it, and before anything is computed that it does not need.
         """
+        self._fair = self._clock.fair(block.time)
         feeder = self._feeders.get(block.kind)
         if feeder is not None:
             feeder(block, out)
@@ -214,7 +218,8 @@ class GuardCore:
         if out is not self._out:  # the same one with every input
             self._out, self._alarm = out, partial(self._stop, out)
         guarded = self._arm is not None and self._arm.supervision.phase is Phase.ACTIVE
-        for event in self._stream.feed(block.payload, block.time, self._alarm if guarded else None):
+        held_up = block.time - self._fair
+        for event in self._stream.feed(block.payload, block.time, self._alarm if guarded else None, held_up):
             self._feed_event(event, out)
         if self._contacts:
             self._update_contacts(block.time, out)
@@ -362,6 +367,12 @@ class GuardCore:
     def _feed_program(self, block: Block, _: Outputs) -> None:
         self._companions.hear_program(block.time)
 
+    def _feed_hold_up(self, block: Block, out: Outputs) -> None:
+        """Take that this computer does not let the driver process, or the guard watchdog, run."""
+        load = block.payload.decode("ascii", "replace")
+        if what := self._companions.hold_up_helper(block.time, load):
+            self._folding.emit(out, EventName.MESSAGE, "held up", block.time, what=what)
+
     def _lose(self, block: Block, out: Outputs) -> None:
         """Take that a port is gone: the arm stops."""
         what, why = decode_loss(block.payload)
@@ -440,16 +451,17 @@ class GuardCore:
     def _poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
         self._folding.poll(now, out)
-        for event in self._stream.silence(now, self._limits.skin_silence):
+        fair = self._fair
+        for event in self._stream.silence(fair, self._limits.skin_silence):
             self._feed_event(event, out)
         arm = self._arm
         if arm is not None:
-            if arm.phase is not Phase.STARTING and (trouble := arm.state_age.trouble(now)):
+            if arm.phase is not Phase.STARTING and (trouble := arm.state_age.trouble(fair)):
                 self._add_fault(now, trouble, out)
             self._check_companions(now, arm, out)
             if arm.phase is Phase.RETREATING and (stale := self._stale(now) or arm.state_age.stale(now)):
                 arm.abandon_motion(now, stale, out)  # what supervises it is too old
-            arm.poll(now, out)
+            arm.poll(now, fair, out)
         if self.phase is not Phase.STARTING and not self._activation.resetting:
             return
         blockers = self.blockers(now)
@@ -465,7 +477,7 @@ class GuardCore:
 
     def _check_companions(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
         """Stop the arm where a process beside the guard has fallen silent, by a path that does not need it."""
-        for why, paths in self._companions.poll(now):
+        for why, paths in self._companions.poll(self._fair):
             if self.phase is not Phase.STARTING:
                 self._add_fault(now, why, out)
                 if paths:

@@ -19,8 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, SkinTimeout
+from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
-from coneskin.robot.driver.messages import HEARTBEAT_PERIOD, Heartbeat, Shutdown, StopProgram
+from coneskin.robot.driver.liveness import BEAT_PERIOD
+from coneskin.robot.driver.messages import Heartbeat, Shutdown, StopProgram
 from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
@@ -51,10 +53,13 @@ class GuardPorts:
         stops: connections for stops that do not need the driver process, open.
         slider: of the controller's speed, open.
         watchdog: the guard watchdog, where another program moves the arm.
+        second: the second one, which is only told that the guard lives.
         heartbeat: writer of the count that the controller's own watchdog waits for, open.
         setpoints: the reader once more, where it carries setpoints.
         reopen: begins to open a source that is gone again. None where it is gone for good.
         absent: connection of a stop path that the guard does without -> why.
+        program: the process that guards, where it can be watched.
+        helper: that of driver or watchdog, likewise.
     """
 
     session: Channel
@@ -64,10 +69,13 @@ class GuardPorts:
     stops: StopConnections | None = None
     slider: SpeedSlider | None = None
     watchdog: Channel | None = None
+    second: Channel | None = None
     heartbeat: HeartbeatWriter | None = None
     setpoints: SetpointWriter | None = None
     reopen: Callable[[Source], SourceReopening] | None = None
     absent: Mapping[str, str] = field(default_factory=dict)
+    program: ProcessWatch | None = None
+    helper: ProcessWatch | None = None
 
 
 _OWN_COMMANDS = (UseStopPath, JointVelocitySetpoint, SetpointProgram, SetSpeedSlider)
@@ -125,6 +133,7 @@ _HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
 #: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
 _PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
+_LATE_TIME = 2.0 * BEAT_PERIOD  # s without a heartbeat, from which on it is asked why
 _QUESTION_PERIOD = 0.25  # s between two questions whether the controller takes stops
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
 _REPORT_PERIOD = 0.005  # s between two reports to the session where nothing was decided
@@ -169,7 +178,8 @@ class GuardLoop:
             self._epoll = select.epoll.fromfd(os.dup(self._selector.fileno()))
         self._quit = False
         self._fed = False  # anything, in this step
-        self._beat = -HEARTBEAT_PERIOD
+        self._beat = -BEAT_PERIOD
+        self._helper_heard = clock()
         self._asked = self._clock()  # when the controller was last asked whether it takes stops
         self._count = 0  # sent last
         self._out: list[bytes] = []
@@ -199,7 +209,7 @@ class GuardLoop:
 
     def _open(self) -> None:
         ports = self._ports
-        for name in ("session", "driver", "watchdog", "reader", "slider", "heartbeat"):
+        for name in ("session", "driver", "watchdog", "second", "reader", "slider", "heartbeat"):
             if (item := getattr(ports, name)) is not None:
                 self._watch(item, name)
         if ports.source is not None:
@@ -244,6 +254,10 @@ class GuardLoop:
         for name, channel in (("driver", ports.driver), ("watchdog", ports.watchdog)):
             if channel is not None and name in ready:  # before the states: they show what was announced here
                 self._read_channel(channel)
+        if ports.second is not None and "second" in ready:
+            ports.second.receive()
+            if ports.second.closed:
+                self._lose("second", "the second guard watchdog has ended", ports.second)
         if not arm_first and "reader" in ready:
             self._read(ports.reader, "controller", BlockKind.ARM)
         if "slider" in ready:
@@ -253,15 +267,14 @@ class GuardLoop:
             ports.heartbeat.write(count)
         if "heartbeat" in ready:
             self._read(ports.heartbeat, "heartbeat", BlockKind.ECHO)
-        if self._clock() - self._beat >= HEARTBEAT_PERIOD:
+        if self._clock() - self._beat >= BEAT_PERIOD:
             self._send_heartbeat()
+            self._look_at_processes()
         if "stops" in ready and ports.stops is not None:
             self._drain(ports.stops)
         if "session" in ready:
             for message in ports.session.receive():
-                if message == _HEARTBEAT_BYTES:
-                    self._feed(BlockKind.PROGRAM, b"")
-                elif message.startswith(b"reset "):
+                if message.startswith(b"reset "):
                     self._feed(BlockKind.RESET, message.removeprefix(b"reset "))
                 elif message == b"quit":
                     self._quit = True
@@ -291,6 +304,7 @@ class GuardLoop:
             self._out.clear()
 
     def _read_channel(self, channel: Channel) -> None:
+        self._helper_heard = self._clock()
         for message in channel.receive():
             self._feed(BlockKind.DRIVER, message)
         if channel.closed:
@@ -303,9 +317,17 @@ class GuardLoop:
         if self._ports.stops is not None and now - self._asked >= _QUESTION_PERIOD:
             self._asked = now
             self._ports.stops.ask()
-        for channel in (self._ports.driver, self._ports.watchdog):
+        for channel in (self._ports.driver, self._ports.watchdog, self._ports.second):
             if channel is not None:
                 channel.send(_HEARTBEAT_BYTES)
+
+    def _look_at_processes(self) -> None:
+        """Tell the core whether the program is suspended, and whether a helper that is late waits for a processor."""
+        program, helper = self._ports.program, self._ports.helper
+        if program is not None and not program.suspended():
+            self._feed(BlockKind.PROGRAM, b"")
+        if helper is not None and self._beat - self._helper_heard > _LATE_TIME and helper.waits(self._beat):
+            self._feed(BlockKind.HELD_UP, load().encode())
 
     def _read_skin(self, source: Source) -> None:
         try:
@@ -388,7 +410,9 @@ class GuardLoop:
         end = self._clock() + (_SESSION_GONE_TIMEOUT if self._ports.session.closed else _SHUTDOWN_TIMEOUT)
         while (self._core.phase.stopping or self._core.phase is Phase.RETREATING) and self._clock() < end:
             self.poll(_TICK_PERIOD)
-        if self._ports.watchdog is not None and not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
-            self._ports.watchdog.send(Shutdown().encode())
+        if not (self._core.phase.stopping or self._core.phase is Phase.RETREATING):
+            for channel in (self._ports.watchdog, self._ports.second):
+                if channel is not None:
+                    channel.send(Shutdown().encode())
         self._report()
         self._ports.session.finish(_FLUSH_TIMEOUT)

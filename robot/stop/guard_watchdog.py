@@ -1,8 +1,11 @@
-"""Guard watchdog: a process that stops an externally controlled arm when its guard is gone.
+"""Guard watchdog: a process that stops an externally controlled arm when its guard is gone. There are two.
 
-Its connections are open before they are needed, and it imports nothing that can block. It acts when the guard's channel
-ends without a shutdown message, brings no heartbeat, or asks for a stop because its own connections are gone. From then
-on it holds the arm at standstill, until the guard lives again or the guarded program has left.
+It acts when the guard's channel ends without a shutdown message, brings no heartbeat, or asks for a stop because the
+guard's own connections are gone. From then on it holds the arm at standstill, until the guard lives again or the
+guarded program has left. A stop from two processes at once does no harm, so neither asks the other.
+
+The first one's connections are open before they are needed. The second one waits longer, and opens its own through
+whatever port answers then: what broke those of all others is not there yet.
 """
 
 from __future__ import annotations
@@ -11,13 +14,14 @@ import math
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 
-from coneskin.core.channel import Channel, decode_json, wait_readable
+from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
+from coneskin.robot.driver.liveness import BEAT_PERIOD, GUARD_SILENCE, UNGUARDED_TIME
 from coneskin.robot.driver.messages import (
-    HEARTBEAT_TIMEOUT,
-    REPORT_PERIOD,
+    LEAVE,
     Release,
     Shutdown,
     StatusReport,
@@ -33,6 +37,7 @@ from .limits import MonitoringLimits
 __all__ = ["main"]
 
 _POLL_PERIOD = 0.01  # s between two looks
+_CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
 
 
 class _GuardWatchdog:
@@ -40,17 +45,25 @@ class _GuardWatchdog:
 
     Args:
         guard: the guard's channel.
-        session: the guarded program's channel, which ends when the program leaves.
+        session: the guarded program's channel; it ends, or says ``LEAVE``, when the program leaves.
         hold: of the arm.
+        patience: for which the guard may be silent [s].
         clock: monotonic seconds.
     """
 
     def __init__(
-        self, guard: Channel, session: Channel, hold: StandstillHold, clock: Callable[[], float] = time.monotonic
+        self,
+        guard: Channel,
+        session: Channel,
+        hold: StandstillHold,
+        patience: float = GUARD_SILENCE,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._guard = guard
         self._session = session
         self._hold = hold
+        self._patience = patience
+        self._left = False  # the guarded program
         self._clock = clock
         self._heard: float | None = None  # None until the guard's first heartbeat
         self._alone = False  # the guard is gone, or hangs
@@ -69,7 +82,7 @@ class _GuardWatchdog:
         wait_readable(inputs, timeout)
         now = self._clock()
         self._beat()
-        self._session.receive()
+        self._left = self._left or LEAVE in self._session.receive() or self._session.closed
         asked: StopProgram | None = None
         for message in self._guard.receive():
             self._heard, self._alone = now, False
@@ -82,23 +95,30 @@ class _GuardWatchdog:
                     asked = stop  # of several that have waited the newest
         if asked is not None:
             self._hold.begin(asked.deceleration, self._beat)
+            return True
         gone = self._guard.closed
         if gone and self._heard is None:
             return False  # it never guarded anything
-        if not gone and (self._heard is None or now - self._heard <= HEARTBEAT_TIMEOUT):
+        if not gone and (self._heard is None or now - self._heard <= self._patience):
             self._hold.rest()
         elif not self._alone:
             self._alone = True
-            what = f"the guard was silent for {HEARTBEAT_TIMEOUT:g} s, the arm was stopped"
+            what = f"the guard was silent for {self._patience:g} s, the arm was stopped"
             self._guard.send(StatusReport("error", what).encode())
             self._hold.begin(over=self._beat)
+            self._report(self._hold.failed)
         else:
-            self._hold.poll(self._beat)
-        return not (gone and self._session.closed and (self._hold.stands or self._hold.failed))
+            self._report(self._hold.poll(self._beat))
+        return not (gone and self._left and (self._hold.stands or self._hold.failed))
+
+    def _report(self, outcome: bool) -> None:
+        """Tell the program whether the arm stands, where that is known now."""
+        if outcome:
+            self._session.send(encode_json({"stands": self._hold.stands}))
 
     def _beat(self) -> bool:
         """Send a heartbeat where one is due; return False, because no stop under way is over with it."""
-        if (now := self._clock()) - self._beaten >= REPORT_PERIOD:
+        if (now := self._clock()) - self._beaten >= BEAT_PERIOD:
             self._beaten = now
             self._guard.send(StatusReport("alive").encode())
         return False
@@ -116,12 +136,18 @@ def main(arguments: list[str]) -> int:
     limits = MonitoringLimits(**settings["monitoring"])
     host = settings["host"]
     try:
-        driver = load_driver(settings["family"])
-        with driver.stop_connections(host) as connections, driver.state_reader(host) as reader:
+        driver, second = load_driver(settings["family"]), bool(settings.get("second"))
+        with ExitStack() as stack:
+            connections, reader = driver.stop_connections(host, _CONNECT_TIMEOUT), None
+            if not second:
+                connections = stack.enter_context(driver.stop_connections(host))
+                reader = stack.enter_context(driver.state_reader(host))
+            stop = BackupStop(driver, connections, limits, settings["deceleration"], reader)
+            stack.callback(stop.close)
             lifeline.hold()
             guard.send(StatusReport("ready").encode())
-            stop = BackupStop(driver, connections, limits, settings["deceleration"], reader)
-            _GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill)).run()
+            patience = UNGUARDED_TIME if second else GUARD_SILENCE
+            _GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill), patience).run()
     except ConeSkinError as exc:
         guard.send(StatusReport("error", str(exc)).encode())
         return 1

@@ -20,8 +20,8 @@ class MonitoringLimits:
         arm_silence: longest age of the controller's newest state [s].
         escalate: without a slowdown for this long after a stop, the next stop path is used [s].
         standstill: joint speed below which the arm stands [rad/s].
-        program_silence: longest time without a heartbeat of the program that guards [s]; a third more for the driver
-            process or the guard watchdog, and for a request on its way.
+        program_silence: longest time for which the program that guards may be suspended [s]; a third more for a
+            silence of driver process or guard watchdog, and for a request on its way.
         settle: time for which all preconditions must hold before the guard becomes active [s].
     """
 

@@ -22,9 +22,8 @@ from coneskin.core.channel import Channel, decode_json, encode_json, wait_readab
 from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.deadman import Deadman
+from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import (
-    HEARTBEAT_TIMEOUT,
-    SETPOINT_TIMEOUT,
     EndReaction,
     GuardCommand,
     Heartbeat,
@@ -243,7 +242,7 @@ class DriverProcess:
         for number, command in enumerate(commands):
             if isinstance(command, SetJointVelocity) and number < newest:
                 continue  # a newer motion command has overtaken it
-            if self._patience != SETPOINT_TIMEOUT or not isinstance(command, Heartbeat):
+            if self._patience != SETPOINT_SILENCE or not isinstance(command, Heartbeat):
                 self._heard = now
             self._serve_guard(command)
 
@@ -262,12 +261,12 @@ class DriverProcess:
                     self._stop(deceleration)
                     self._guard.send(StatusReport("done").encode())
                 case SetJointVelocity(qd, acceleration):
-                    self._allowed, self._patience, self._expires = False, SETPOINT_TIMEOUT, math.inf
+                    self._allowed, self._patience, self._expires = False, SETPOINT_SILENCE, math.inf
                     self._arm.speed("speed_j", qd, acceleration)
                 case Release(number):
                     self._work(_START_TIMEOUT)
                     self._arm.revive()
-                    self._allowed, self._patience = True, HEARTBEAT_TIMEOUT
+                    self._allowed, self._patience = True, GUARD_SILENCE
                     self._guard.send(StatusReport("released", str(number)).encode())
         except ConeSkinError as exc:
             self._guard.send(StatusReport("error", str(exc)).encode())
@@ -305,7 +304,7 @@ class DriverProcess:
             sent = min(float(request["sent"]), now)  # what is said to come from later holds no longer
             age = now - sent
             if request["do"] != "stop" and not age <= self._request_lifetime:
-                self._reply(number, ok=False, stopped=False, why=_void(age, self._request_lifetime))
+                self._reply(number, ok=False, stopped=False, void=True, why=_void(age, self._request_lifetime))
             elif not self._allowed:
                 self._reply(number, ok=False, stopped=True, why="the guard does not let the arm move")
             elif request["do"] == "stop":

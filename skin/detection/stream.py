@@ -52,6 +52,7 @@ class TouchStream:
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
         self._bad = self._skipped = self._versions = 0
+        self._held_up = 0.0
         self._corrupt = self._starting = self._version_reported = False
 
     @property
@@ -64,23 +65,28 @@ class TouchStream:
         """True while any sensor is touched."""
         return any(detector.touched for detector in self.detectors)
 
-    def feed(self, data: bytes, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
+    def feed(self, data: bytes, now: float, alarm: TouchAlarm | None = None, held_up: float = 0.0) -> list[SkinEvent]:
         """Take the next bytes.
 
         Args:
             data: any number of bytes.
             now: host clock when they arrived [s], monotonic.
             alarm: called where the first that happens is that a touch begins, before its place is worked out.
+            held_up: for how long the reader itself may have kept them waiting [s]: that is no lag of theirs.
 
         Returns:
             what happened, in the order of the frames.
         """
         events: list[SkinEvent] = []
         frames = self.decoder.feed(data)
+        if held_up != self._held_up:
+            self._held_up = held_up
+            for detector in self.detectors:
+                detector.timing.held_up = held_up
         for frame in frames:
-            detector = self._by_number.get(frame.device << 8 | frame.sensor)
-            if detector is not None:
-                happened = detector.feed(frame, now, alarm)
+            found = self._by_number.get(frame.device << 8 | frame.sensor)
+            if found is not None:
+                happened = found.feed(frame, now, alarm)
                 if happened:
                     events += happened
                     alarm = None  # what has happened decides first

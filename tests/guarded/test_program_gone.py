@@ -112,7 +112,19 @@ def test_a_program_that_is_frozen_stops_its_arm_and_hears_why(controller, tmp_pa
         program.process.send_signal(signal.SIGSTOP)
         assert_stopped_on_the_way(controller)
         program.process.send_signal(signal.SIGCONT)
-        assert "the program that guards: no heartbeat for 1500 ms" in program.process.stdout.readline()
+        assert "the program that guards: it was suspended for 1500 ms" in program.process.stdout.readline()
+
+
+@pytest.mark.promise("P50")
+def test_a_program_that_keeps_pythons_lock_for_seconds_is_not_stopped(controller, tmp_path):
+    """`sorted` of 1.5 million numbers, an import, a C call: with a heartbeat of its own it counted as frozen."""
+    goal = [GOAL[0] + 0.5, *GOAL[1:]]
+    body = f"g.arm.move_j({goal}, 1.0, 4.0, wait=False); ctypes.PyDLL(None).usleep(3_000_000); g.arm.wait()"
+    body += "; print([str(event.name) for event in g.events if event.name in ('stopping', 'fault')])"
+    with Program(tmp_path, scene_text(controller.host), body, "import ctypes") as program:
+        assert program.process.stdout.readline() == "[]\n"
+        assert program.process.wait(DEADLINE) == 0
+    assert controller.state()["q"] == pytest.approx(goal, abs=1e-3)
 
 
 @pytest.mark.promise("P41")

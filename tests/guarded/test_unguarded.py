@@ -9,8 +9,10 @@ from contextlib import suppress
 
 import pytest
 
+from coneskin.core.channel import Channel, decode_json
 from coneskin.core.errors import RobotConnectionError, SensorError
-from coneskin.session.guard_monitor import FallbackStop
+from coneskin.robot.driver.messages import LEAVE, Heartbeat
+from coneskin.session.child_processes import ChildProcesses
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 
@@ -158,15 +160,23 @@ def test_a_stop_goes_out_by_whatever_port_opens():
 
 
 def stop_by(host, numbers):
-    ports = Ports(host, numbers)
-    resort = FallbackStop(scene_for(type("Host", (), {"host": host}), control="external"))
+    """The second watchdog of a guard that is gone, alone with a controller that says nothing."""
+    ports, ends = Ports(host, numbers), []
+    scene, processes = scene_for(type("Host", (), {"host": host}), control="external"), ChildProcesses()
+    session = processes._start_helper("second watchdog", "coneskin.robot.stop.guard_watchdog", scene, ends)
+    guard = Channel(ends[0])
     try:
+        until(lambda: guard.receive() != [])
+        guard.send(Heartbeat().encode())
+        guard.close()
         port, word = (30003, b"stopj(10.000)") if 30003 in numbers else (29999, b"stop\n")
-        resort.poll(lambda: word in ports.got[port])
         until(lambda: word in ports.got[port])
-        assert resort.stands is False  # nobody has seen it
         seen = len(ports.got[port])
-        until(lambda: resort.poll(lambda: False) or len(ports.got[port]) > seen)  # and again, now and then
+        until(lambda: len(ports.got[port]) > seen)  # and again, now and then
+        session.send(LEAVE)
+        assert processes.children["second watchdog"].wait(DEADLINE) == 0  # it gives up: nobody can say that it stands
+        assert [decode_json(message) for message in session.receive()] == [{"stands": False}]
     finally:
-        resort.end()
+        session.close()
+        processes.children["second watchdog"].wait()
         ports.close()

@@ -55,6 +55,21 @@ def test_a_thread_that_waits_for_a_move_does_not_keep_the_answer_of_another(ends
     assert [(one["what"]) for one in moved] == ["move"]
 
 
+def test_a_request_that_was_held_up_until_it_was_void_is_sent_again_while_its_caller_waits(ends) -> None:
+    program, driver = ends
+    requests = _ArmRequests(program, lambda stopped: None)
+    moved = []
+    thread = call(lambda: requests.do(do="move"), moved)
+    first = asked(driver)
+    driver.send(encode_json({"number": first["number"], "ok": False, "stopped": False, "void": True, "why": "late"}))
+    again = asked(driver)
+    assert again["number"] != first["number"]
+    assert again["sent"] >= first["sent"]
+    answer(driver, again["number"], what="move")
+    thread.join(5.0)
+    assert [one["what"] for one in moved] == ["move"]
+
+
 def test_answers_that_nobody_waits_for_any_more_are_not_kept(ends) -> None:
     program, driver = ends
     gone = []

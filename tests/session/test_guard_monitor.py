@@ -1,12 +1,11 @@
-"""Guard monitor: a guard that hangs, or has ended unannounced, is missed, and the fallback stop stands in for it."""
+"""Guard monitor: a guard that hangs, or has ended unannounced, is missed, and what the watchdogs say is noted."""
 
 import logging
-import threading
 import time
 
 import pytest
 
-from coneskin.core.channel import Channel, pair
+from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.recording.block import encode_block
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.session.event_log import EventLog
@@ -25,122 +24,110 @@ def emit(theirs, name, time=1.0, **details):
     theirs.send(encode_block(GuardEvent(name, time, details).block()))
 
 
-def monitored(channel, fallback):
+def monitored(channel, *watchdogs):
     """Return a log and a running monitor."""
     log = EventLog()
-    monitor = GuardMonitor(log, channel, fallback)
+    monitor = GuardMonitor(log, channel, watchdogs)
     monitor.start()
     return log, monitor
 
 
-class Standing:
-    """Fallback stop that counts the stops; ``stands`` from the first on."""
+@pytest.fixture
+def watchdog():
+    ours, theirs = (Channel(end) for end in pair())
+    yield ours, theirs
+    ours.close()
+    theirs.close()
 
-    def __init__(self):
-        self.stops, self.ends, self.stands = 0, 0, False
-        self.moves = threading.Event()
-        self.moves.set()
 
-    def poll(self, over):
-        moved = self.moves.is_set()
-        self.moves.clear()
-        self.stops += moved
-        self.stands = True
-        return moved
+def until(what):
+    end = time.monotonic() + 5.0
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.001)
 
-    def end(self):
-        self.ends += 1
-        self.moves.set()  # the next first look is a stop again
+
+def fallback_stops(log):
+    return [event.details["stands"] for event in log.events if event.name == "fallback_stop"]
 
 
 @pytest.mark.parametrize(
-    ("reported", "times"),
-    [(["activated"], 1), (["activated", "latched"], 1), (["activated", "ending"], 0), (["waiting", "guard_exited"], 0)],
+    ("reported", "missed"),
+    [
+        (["activated"], True),
+        (["activated", "latched"], True),
+        (["activated", "ending"], False),
+        (["waiting", "guard_exited"], False),
+    ],
 )
-def test_an_active_guard_that_ends_unannounced_is_missed(channel, reported, times):
+def test_an_active_guard_that_ends_unannounced_is_missed(channel, reported, missed):
     ours, theirs = channel
-    fallback = Standing()
-    log, monitor = monitored(ours, fallback)
+    log, monitor = monitored(ours)
     for name in reported:
         emit(theirs, name)
     theirs.close()
+    until(lambda: log.ended)
     monitor.close()
-    assert fallback.stops == times
-    assert ("guard_exited" in [event.name for event in log.events[len(reported) :]]) is bool(times)
-    assert ("unannounced" in monitor.lost) is bool(times)
+    assert ("guard_exited" in [event.name for event in log.events[len(reported) :]]) is missed
+    assert ("unannounced" in monitor.lost) is missed
 
 
-def test_a_guard_that_is_gone_is_stood_in_for_until_the_program_ends(channel):
+@pytest.mark.promise("P45")
+def test_what_the_watchdogs_report_of_a_guard_that_is_gone_is_noted_until_the_program_has_ended(channel, watchdog):
     ours, theirs = channel
-    fallback = Standing()
-    log, monitor = monitored(ours, fallback)
+    log, monitor = monitored(ours, watchdog[0])
     emit(theirs, "activated")
     theirs.close()
-    stop = log.wait_for(("fallback_stop",), 5.0) or next(event for event in fallback_stops(log, 1))
-    assert stop.details["stands"] is True
-    fallback.moves.set()  # a program moves the arm
-    assert fallback_stops(log, 2)
+    watchdog[1].send(encode_json({"stands": False}))
+    until(lambda: fallback_stops(log) == [False])
+    watchdog[1].send(encode_json({"stands": True}))  # the last that it says, as it ends
+    watchdog[1].close()
     monitor.close()
-    assert fallback.stops == 2
-
-
-def fallback_stops(log, count):
-    """Return the fallback stops once there are this many; the log's own wait does not work after its end."""
-    end = time.monotonic() + 5.0
-    while len(stops := [event for event in log.events if event.name == "fallback_stop"]) < count:
-        assert time.monotonic() < end
-        time.sleep(0.001)
-    return stops
+    assert fallback_stops(log) == [False, True]
 
 
 @pytest.mark.promise("P42")
-def test_each_time_that_a_guard_hangs_it_is_missed_anew(channel, monkeypatch):
-    monkeypatch.setattr("coneskin.session.guard_monitor._SESSION_HEARTBEAT_TIMEOUT", 0.01)
+def test_each_time_that_a_guard_hangs_it_is_missed_anew(channel, watchdog, monkeypatch):
+    monkeypatch.setattr("coneskin.session.guard_monitor.UNGUARDED_TIME", 0.01)
     ours, theirs = channel
-    fallback = Standing()
-    log, monitor = monitored(ours, fallback)
+    log, monitor = monitored(ours, watchdog[0])
     emit(theirs, "activated")
-    for _ in range(2):
+    for count in (1, 2):
         seen = len(log.events)
         assert "has sent nothing" in log.wait_for(("guard_unresponsive",), 5.0, after=seen).details["what"]
-        assert log.wait_for(("fallback_stop",), 5.0, after=seen) is not None
+        watchdog[1].send(encode_json({"stands": True}))
+        until(lambda count=count: len(fallback_stops(log)) == count)
         emit(theirs, "latched")
         assert log.wait_for(("latched",), 5.0, after=seen) is not None
     emit(theirs, "ending")
     theirs.close()
     monitor.close()
-    assert fallback.stops == 2
     assert monitor.lost == ""
 
 
-def test_the_end_is_set_whatever_happens_in_the_thread(channel, monkeypatch, caplog):
+def test_the_end_is_set_whatever_happens_in_the_thread(channel, watchdog, caplog):
     ours, theirs = channel
-
-    class Broken(Standing):
-        def poll(self, over):
-            raise OSError("no descriptor is left")
-
-    log, monitor = monitored(ours, Broken())
+    log, monitor = monitored(ours, watchdog[0])
     emit(theirs, "activated")
-    theirs.close()
+    watchdog[1].send(b"nonsense")
     with caplog.at_level(logging.ERROR, "coneskin"):
+        theirs.close()
+        until(lambda: log.ended)
         monitor.close()
-    assert log.ended
-    assert "no descriptor is left" in caplog.text
+    assert "the guard is not monitored any more" in caplog.text
     assert log.wait_for(("never",), 60.0) is None
 
 
 def test_a_guard_is_missed_whatever_a_program_does_with_the_events(channel):
     ours, theirs = channel
-    fallback = Standing()
-    log, monitor = monitored(ours, fallback)
+    log, monitor = monitored(ours)
     emit(theirs, "activated")
     assert log.wait_for(("activated",), 5.0) is not None
     log.events.clear()
     theirs.close()
+    until(lambda: log.ended)
     monitor.close()
     assert "unannounced" in monitor.lost
-    assert fallback.stops == 1
 
 
 @pytest.mark.parametrize(("names", "said"), [(["waiting"], 1), (["waiting", "activated"], 0), (["activated"], 0)])
@@ -148,7 +135,7 @@ def test_what_is_wrong_with_the_skins_line_is_said_while_the_guard_waits(channel
     monkeypatch.setattr("coneskin.session.guard_monitor._ACTIVATION_TIME", 0.0)
     ours, theirs = channel
     log = EventLog()
-    monitor = GuardMonitor(log, ours, None, lambda why: f"the checksum, because {why[0]}")
+    monitor = GuardMonitor(log, ours, (), lambda why: f"the checksum, because {why[0]}")
     for name in names:
         theirs.send(encode_block(GuardEvent(name, 1.0, {"reasons": ["no frame"]}).block()))
     emit(theirs, "ending", what="done")

@@ -60,7 +60,7 @@ class BlockKind(IntEnum):
     RESET = 5  #: a manual reset: the number of the stop that it forgives, and its own, in decimal digits
     LOST = 6  #: a source, a connection or a process is gone; the payload says which and why
     SLIDER = 7  #: payload of the speed slider, for the driver's ``decode_speed_fraction``
-    PROGRAM = 8  #: a heartbeat of the program that guards
+    PROGRAM = 8  #: the program that guards is not suspended
     ABSENT = 9  #: a stop path that is not there from the start; the payload says which connection and why
     EVENT = 10  #: a GuardEvent, JSON
     COMMAND = 11  #: a command as it was sent: to whom, a line feed, its bytes
@@ -70,6 +70,7 @@ class BlockKind(IntEnum):
     TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not; the force of a contact
     ECHO = 30  #: payload of the heartbeat's connection, for the driver's ``decode_heartbeat``
     SUSPENDED = 31  #: for how long the loop did nothing [s], by a clock that goes on while the computer sleeps
+    HELD_UP = 33  #: this computer does not let the process beside the guard run; how busy it is, in words
     REOPENED = 32  #: what was lost is open again; the payload says which: the skin
 
 
@@ -117,7 +118,7 @@ class EventName(StrEnum):
     GUARD_EXITED = "guard_exited", "The guard's process has ended."
     GUARD_UNRESPONSIVE = "guard_unresponsive", "The guard sends no heartbeat."
     GUARD_RESPONSIVE = "guard_responsive", "The guard's heartbeat is back."
-    FALLBACK_STOP = "fallback_stop", "The session has stopped the arm without the guard."
+    FALLBACK_STOP = "fallback_stop", "A guard watchdog has stopped the arm without the guard."
     RECORDING_GAP = "recording_gap", "Blocks are missing from the recording."
     SKIN_LINE = "skin_line", "The guard waits for a skin, and its bytes are wrong. `what` says how."
 

@@ -66,6 +66,7 @@ class FrameTiming:
         sequence: of the newest frame.
         clock_us: of the newest frame [us].
         lag: how much later than the quickest frame the newest one arrived [s].
+        held_up: for how long the reader itself may have kept frames waiting [s].
         detail: numbers that belong to the newest fault.
     """
 
@@ -75,6 +76,7 @@ class FrameTiming:
         self.frames = self.missing = self.old = 0
         self.sequence = self.clock_us = 0
         self.detail = ""
+        self.held_up = 0.0
         self._valid_at = -math.inf
         self.restart()
 
@@ -153,7 +155,7 @@ class FrameTiming:
             self._gained += self._offset - offset if settled else 0.0
             self._offset = offset
         self.lag = lag = offset - self._offset
-        if lag > late:
+        if lag > late + self.held_up:
             limit = f"{self.lag * 1e3:.1f} ms late, skin_late_ms = {1e3 * late:g}"
             self.detail = f"{limit}; a busy computer needs more, or fewer frames a second; or {self._advice('slow')}"
             return Fault.LATE

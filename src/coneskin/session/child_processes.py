@@ -1,4 +1,4 @@
-"""Child processes of a session: the guard, the driver process or the guard watchdog, and a virtual skin.
+"""Child processes of a session: the guard, the driver process or two guard watchdogs, and a virtual skin.
 
 Each is on a channel. A child ends when its channel does, so that none outlives the session for long.
 """
@@ -6,18 +6,16 @@ Each is on a channel. A child ends when its channel does, so that none outlives 
 from __future__ import annotations
 
 import subprocess
-import threading
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.child_process import spawn
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.driver.messages import REPORT_PERIOD, Heartbeat
+from coneskin.robot.driver.messages import LEAVE
 from coneskin.robot.driver.registry import load_driver
 from coneskin.skin.sources.kinds import is_simulated
-
-from .guard_monitor import stop_settings
 
 if TYPE_CHECKING:
     import socket
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ChildProcesses"]
 
+_WATCHDOG_NAMES = ("watchdog", "second watchdog")
 _END_TIMEOUT = 6.0  # s for the guard to stop the arm and end
 
 
@@ -35,9 +34,10 @@ class ChildProcesses:
     """Child processes of one session, started once and ended once.
 
     Attributes:
-        children: by name: "guard", "driver" or "watchdog", "skin".
+        children: by name: "guard", "driver" or "watchdog" and "second watchdog", "skin".
         guard: channel to the guard; None before the start.
         program: channel to the driver process, for the guarded program; None with external control.
+        watchdogs: channels to the guard watchdogs.
         skin: client of the virtual skin; None where the skin is not virtual.
     """
 
@@ -45,8 +45,8 @@ class ChildProcesses:
         self.children: dict[str, subprocess.Popen[bytes]] = {}
         self.guard: Channel | None = None
         self.program: Channel | None = None
+        self.watchdogs: list[Channel] = []
         self.skin: SkinClient | None = None
-        self._stopped = threading.Event()  # ends the heartbeat
         self._lifelines: list[Channel] = []  # to the children besides the guard, which end with them
 
     def start(
@@ -77,29 +77,38 @@ class ChildProcesses:
             self._lifelines.append(self.skin.channel)
         ours, theirs = pair()
         ends = [theirs]
-        if scene.arm is not None:
-            guard_end, other_guard_end = pair()
-            program_end, other_program_end = pair()
-            channel = Channel(program_end)
-            self._lifelines.append(channel)
-            ends.append(guard_end)
-            internal = scene.arm.control == "internal"
-            name = "driver" if internal else "watchdog"
-            arm = arm_model(scene.arm.model)
-            module = load_driver(arm.family).process if internal else "coneskin.robot.stop.guard_watchdog"
-            self.children[name] = spawn(module, other_guard_end, other_program_end)
-            lifetime = scene.monitoring_limits.process_silence
-            driver_settings = {"watchdog_hz": scene.arm.watchdog_hz, "request_lifetime": lifetime}
-            channel.send(encode_json({**stop_settings(scene), **driver_settings}))
-            if internal:
-                self.program = channel
+        if scene.arm is not None and scene.arm.control == "internal":
+            module = load_driver(arm_model(scene.arm.model).family).process
+            self.program = self._start_helper("driver", module, scene, ends)
+            self._lifelines.append(self.program)
+        elif scene.arm is not None:
+            for name in _WATCHDOG_NAMES:
+                self.watchdogs.append(self._start_helper(name, "coneskin.robot.stop.guard_watchdog", scene, ends))
         self.guard = Channel(ours)
         self.children["guard"] = spawn("coneskin.session.guard_process", *ends)
         port = "" if self.skin is None else self.skin.port()  # the others start meanwhile
-        self.guard.send(encode_json({**start, "port": port}))
-        arguments = (self.guard, self._stopped)
-        threading.Thread(target=_send_heartbeat, args=arguments, name="coneskin heartbeat", daemon=True).start()
+        helper = self.children.get("driver") or self.children.get("watchdog")
+        self.guard.send(encode_json({**start, "port": port, "helper": 0 if helper is None else helper.pid}))
         return self.guard
+
+    def _start_helper(self, name: str, module: str, scene: Scene, ends: list[socket.socket]) -> Channel:
+        """Start a process that stops the arm, and return the channel to it; its guard's end joins the others."""
+        assert scene.arm is not None
+        (guard_end, helper_end), (ours, theirs) = pair(), pair()
+        ends.append(guard_end)
+        self.children[name] = spawn(module, helper_end, theirs)
+        channel, limits = Channel(ours), scene.monitoring_limits
+        settings = {
+            "family": arm_model(scene.arm.model).family,
+            "host": scene.arm.host,
+            "monitoring": asdict(limits),
+            "deceleration": scene.default_reaction.deceleration,
+            "watchdog_hz": scene.arm.watchdog_hz,
+            "request_lifetime": limits.process_silence,
+            "second": name == _WATCHDOG_NAMES[1],
+        }
+        channel.send(encode_json(settings))
+        return channel
 
     def note_script(self) -> None:
         """Note the script of a virtual skin, once it plays.
@@ -118,32 +127,28 @@ class ChildProcesses:
         """
         if self.guard is not None:
             self.guard.send(b"quit")
-        for name in ("guard", "driver", "watchdog", "skin"):
+        for name in ("guard", "driver", *_WATCHDOG_NAMES, "skin"):
             child = self.children.pop(name, None)
             if child is None:
                 continue
             if name != "guard":  # the others end when their channels do, after the guard has stopped the arm
                 for channel in self._lifelines:
                     channel.close()
+                for channel in self.watchdogs:
+                    channel.send(LEAVE)
             try:
                 child.wait(_END_TIMEOUT)
             except subprocess.TimeoutExpired:
-                if name == "watchdog" and not stands():
+                if name in _WATCHDOG_NAMES and not stands():
                     continue  # it is still stopping the arm, and ends when that stands
                 child.kill()
                 child.wait()
 
     def close(self) -> None:
-        """End the heartbeat, and close the lines to guard and physics; may be called again."""
-        self._stopped.set()
+        """Close the lines to guard, watchdogs and physics; may be called again."""
+        for channel in self.watchdogs:
+            channel.close()
         if self.skin is not None:
             self.skin.close()
         if self.guard is not None:
             self.guard.close()
-
-
-def _send_heartbeat(guard: Channel, stopped: threading.Event) -> None:
-    """Send the heartbeat of this process to the guard until its channel ends, or until it is stopped."""
-    message = Heartbeat().encode()
-    while guard.send(message) and not stopped.wait(REPORT_PERIOD):
-        pass

@@ -22,7 +22,7 @@ _AUTOGROUP_FILE = Path("/proc/self/autogroup")  # of sched(7): nice values only 
 def main(arguments: list[str]) -> int:
     """Take the channels and the scene, open what it names, and run until the guard is to end."""
     shorten_time_slice()
-    lifeline, (session, *rest) = inherit(arguments)
+    lifeline, (session, *others) = inherit(arguments)
     # while the other processes start; not above, because the program may be gone before all of it is loaded
     from coneskin.robot.guard.signals.journal import EventName, GuardEvent, RecordingOverflowFilter
     from coneskin.scene.reader import parse_scene
@@ -31,7 +31,6 @@ def main(arguments: list[str]) -> int:
     from .guard_run import run_guard
 
     session.overflow = RecordingOverflowFilter()
-    other = rest[0] if rest else None
     while not (hello := session.receive()) and not session.closed:
         wait_readable([session], 1.0)
     if not hello or hello[0] == b"quit":
@@ -45,7 +44,7 @@ def main(arguments: list[str]) -> int:
         known = Commissioning.from_message(start["commissioning"])
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]), commissioning=known)
         with contextlib.ExitStack() as stack:
-            run_guard(scene, start, session, other, lifeline, stack)
+            run_guard(scene, start, session, others, lifeline, stack)
     except ConeSkinError as exc:
         event = GuardEvent(EventName.GUARD_EXITED, time.monotonic(), {"what": str(exc), "error": type(exc).__name__})
         session.send(encode_block(event.block()))

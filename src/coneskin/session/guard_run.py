@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from coneskin.core.channel import Channel
 from coneskin.core.child_process import Lifeline
 from coneskin.core.errors import RobotRefused
+from coneskin.core.process_watch import ProcessWatch
 from coneskin.core.recording.block import encode_block
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.scene.build import build_core, place_on_arm
@@ -79,7 +81,7 @@ def run_guard(
     scene: Scene,
     start: dict[str, Any],
     session: Channel,
-    other: Channel | None,
+    others: Sequence[Channel],
     lifeline: Lifeline,
     stack: contextlib.ExitStack,
 ) -> None:
@@ -89,7 +91,7 @@ def run_guard(
         scene: with a source, and perhaps an arm.
         start: what the program has said; it names the port.
         session: channel to the program.
-        other: that to the driver process, or to the guard watchdog; None without an arm.
+        others: those to the driver process, or to the guard watchdogs; none without an arm.
         lifeline: to the program.
         stack: takes what is open.
 
@@ -108,9 +110,10 @@ def run_guard(
         from coneskin.robot.driver.registry import load_driver
 
         if scene.arm.control == "internal":
-            ports.driver = other
+            (ports.driver,) = others
         else:
-            ports.watchdog = other
+            ports.watchdog, ports.second = others
+        ports.program, ports.helper = ProcessWatch(os.getppid()), ProcessWatch(int(start["helper"]))
         arm, needs = arm_model(scene.arm.model), core.needs
         driver, host = load_driver(arm.family), scene.arm.host
         stack.enter_context(_arm_lock(host))

@@ -29,7 +29,7 @@ from coneskin.scene.values.scene import Scene
 
 from .child_processes import ChildProcesses
 from .event_log import EventLog, discard_recording, new_recording
-from .guard_monitor import FallbackStop, GuardMonitor
+from .guard_monitor import GuardMonitor
 from .outcome import activation_error, await_outcome, braking_time, exit_error, reasons, stands, stop_error
 
 if TYPE_CHECKING:
@@ -300,14 +300,11 @@ class Session:
         if self._processes.skin is not None:
             self._log.physics = self._processes.skin.physics
         program = self._processes.program
-        fallback = None
         if scene.arm is not None and program is not None:
             from .ur_rtde_names import UrRtdeArm
 
             self._arm = UrRtdeArm(program, self.check, arm_model(scene.arm.model), scene.arm.host)
-        elif scene.arm is not None:
-            fallback = FallbackStop(scene)
-        self._monitor = GuardMonitor(self._log, channel, fallback, self._describe_line)
+        self._monitor = GuardMonitor(self._log, channel, self._processes.watchdogs, self._describe_line)
         self._monitor.start()
 
     def _await_activation(self) -> None:

@@ -7,7 +7,7 @@ import pytest
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard import companion_monitor
-from coneskin.robot.guard.companion_monitor import _HeartbeatMonitor
+from coneskin.robot.guard.companion_monitor import StallClock, _Heartbeats
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
@@ -29,14 +29,14 @@ def stopping_time(rig, since):
 
 @pytest.mark.promise("P50")
 @BOTH
-def test_a_program_that_is_frozen_stops_its_arm_within_200_ms(external):
+def test_a_program_that_is_suspended_stops_its_arm_within_200_ms(external):
     rig = GuardRig(speed=1.0, external=external).run(0.5)
     rig.companions.program_is_mute = True
     since = rig.now
     rig.run(2.0)
     assert rig.core.phase is Phase.LATCHED
     assert stopping_time(rig, since) < 0.2
-    assert "the program that guards: no heartbeat for 150 ms" in rig.event("latched").details["why"]
+    assert "the program that guards: it was suspended for 150 ms" in rig.event("latched").details["why"]
     rig.companions.program_is_mute = False
     rig.run(1.0)
     assert rig.core.phase is Phase.LATCHED  # alive again is not enough
@@ -62,32 +62,88 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
 
 
 def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
-    monitor = _HeartbeatMonitor({"it": 0.15})
+    monitor, clock = _Heartbeats({"it": 0.15}), StallClock()
     monitor.feed("it", 1.0)
-    assert monitor.silent(1.0) == {}
-    assert monitor.silent(1.5) == {}  # its heartbeats wait to be read
+    assert monitor.silent(clock.fair(1.0)) == {}
+    assert monitor.silent(clock.fair(1.5)) == {}  # its heartbeats wait to be read
     for step in range(1, 150):
-        assert monitor.silent(1.5 + 0.001 * step) == {}
-    assert "no heartbeat for 150 ms" in monitor.silent(1.652)["it"]
+        assert monitor.silent(clock.fair(1.5 + 0.001 * step)) == {}
+    assert monitor.silent(clock.fair(1.652))
     monitor.feed("it", 1.653)
-    assert monitor.silent(1.653) == {}
+    assert monitor.silent(clock.fair(1.653)) == {}
     monitor.forget("it")
-    assert monitor.silent(1.66) == {}
+    assert monitor.silent(clock.fair(3.0)) == {}
+
+
+def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
+    clock = StallClock()
+    assert clock.fair(7.0) == 7.0
+    assert clock.fair(7.1) == pytest.approx(7.0)
+    assert clock.fair(7.1999) == pytest.approx(7.0999 - 0.0, abs=0.1)
+    for step in range(1, 12):
+        now = clock.fair(7.2 + 0.01 * step)
+    assert now == pytest.approx(7.31)
 
 
 @pytest.mark.promise("P48")
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
-    monitor = _HeartbeatMonitor({"it": 0.15})
+    monitor, clock = _Heartbeats({"it": 0.15}), StallClock()
     monitor.feed("it", 0.0)
     now = 0.0
-    while not monitor.silent(now):
+    while not monitor.silent(clock.fair(now)):
         now += 0.03
-        if not monitor.silent(now):
+        if not monitor.silent(clock.fair(now)):
             now += 0.003
     assert 0.15 < now < 0.15 + 0.03 + 0.034
     monitor.feed("it", now)
-    assert not monitor.silent(now)
+    assert not monitor.silent(clock.fair(now))
+
+
+@pytest.mark.promise("P40")
+@BOTH
+def test_a_process_that_waits_for_a_processor_is_no_fault_for_half_a_second(external):
+    rig = GuardRig(speed=1.0, external=external).run(0.5)
+    rig.companions.process_is_mute = True
+    since = rig.now
+    while rig.core.phase is Phase.ACTIVE and rig.now < since + 1.0:
+        rig.feed(BlockKind.HELD_UP, b"load 9.0 on 2 cores")
+        rig.run(0.03)
+    assert 0.47 < stopping_time(rig, since) < 0.56  # the last heartbeat came up to 20 ms before
+    rig.run(1.0)
+    assert "no heartbeat for 500 ms: this computer holds it up (load 9.0 on 2 cores)" in str(
+        rig.event("latched").details["why"]
+    )
+    assert "may do so for 0.5 s" in rig.event("message").details["what"]
+    assert rig.names.count("message") == 1
+
+
+@pytest.mark.promise("P40")
+def test_a_process_that_got_a_processor_and_hangs_has_no_more_time_than_any_other():
+    rig = GuardRig(speed=1.0).run(0.5)
+    rig.companions.process_is_mute = True
+    since = rig.now
+    rig.run(0.1)
+    rig.feed(BlockKind.HELD_UP, b"load 9.0 on 2 cores")
+    rig.run(0.5)
+    assert stopping_time(rig, since) < 0.25
+    assert "the driver process: no heartbeat for 200 ms: it hangs" in rig.event("stopping").details["why"]
+
+
+@pytest.mark.promise("P08")
+@pytest.mark.promise("P14")
+def test_a_guard_that_was_held_up_reads_before_it_calls_anything_silent():
+    """Held up for 0.2 s, it read the skin, and called the controller silent whose states were next to be read."""
+    rig = GuardRig(speed=0.3).run(0.5)
+    rig.now += 0.2
+    rig.feed(BlockKind.TICK, b"")
+    assert rig.core.phase is Phase.ACTIVE
+    assert "fault" not in rig.names
+    since = rig.now
+    while rig.core.phase is Phase.ACTIVE and rig.now < since + 2.0:
+        rig.now += 0.002
+        rig.feed(BlockKind.TICK, b"")
+    assert 0.0 < rig.now - since < 0.21  # as long again, and no longer
 
 
 def test_what_has_never_been_heard_is_a_blocker():
@@ -95,7 +151,7 @@ def test_what_has_never_been_heard_is_a_blocker():
     rig.companions.program_is_mute = True
     rig.run(1.0)
     assert rig.core.phase is Phase.STARTING
-    assert any("no heartbeat yet" in reason for reason in rig.core.blockers(rig.now))
+    assert any("no sign of life yet" in reason for reason in rig.core.blockers(rig.now))
 
 
 # ---- releases

@@ -46,7 +46,12 @@ def test_no_silence_of_a_process_is_left_alone() -> None:
 
 @pytest.mark.parametrize(
     ("control", "part"),
-    [("internal", "program_silence"), ("internal", "watchdog"), ("external", "process_silence")],
+    [
+        ("internal", "program_silence"),
+        ("internal", "watchdog"),
+        ("external", "process_silence"),
+        ("external", "second_silence"),
+    ],
 )
 def test_without_one_who_listens_the_arm_moves_on(control: str, part: str) -> None:
     found = explore(ProcessWorld(control, Parts(**{part: math.inf})), stop_at_first=True)

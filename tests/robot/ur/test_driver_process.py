@@ -4,9 +4,8 @@ import math
 
 import pytest
 
+from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import (
-    HEARTBEAT_TIMEOUT,
-    SETPOINT_TIMEOUT,
     EndReaction,
     Heartbeat,
     Release,
@@ -122,7 +121,7 @@ def test_a_silent_guard_counts_as_dead(driver, now):
         guard.send(Heartbeat().encode())
         served.poll(0.0)
     assert "stopJ" not in stops(made.control)
-    now[0] += HEARTBEAT_TIMEOUT - 0.01
+    now[0] += GUARD_SILENCE - 0.01
     served.poll(0.0)
     assert "stopJ" not in stops(made.control)
     now[0] += 0.02
@@ -145,13 +144,13 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
         guard.send(message.encode())
     served.poll(0.0)
     before = len(stops(made.control))
-    now[0] += SETPOINT_TIMEOUT - 0.01
+    now[0] += SETPOINT_SILENCE - 0.01
     served.poll(0.0)
     assert len(stops(made.control)) == before
     now[0] += 0.02
     served.poll(0.0)
     assert stops(made.control)[before:] == ["speedStop"]
-    assert f"silent for {SETPOINT_TIMEOUT:g} s" in StatusReport.decode(guard.receive()[-1]).text
+    assert f"silent for {SETPOINT_SILENCE:g} s" in StatusReport.decode(guard.receive()[-1]).text
     now[0] += 100.0  # the arm stands, and no heartbeat is due any more
     served.poll(0.0)
     assert stops(made.control)[before:] == ["speedStop"]
@@ -214,7 +213,7 @@ def test_it_waits_for_its_next_kick_or_for_what_is_void_sooner(driver, now):
     served.run()
     served._expires = now[0] + 0.004
     served.run()
-    served._expires, served._patience, served._heard = math.inf, HEARTBEAT_TIMEOUT, now[0] - HEARTBEAT_TIMEOUT + 0.002
+    served._expires, served._patience, served._heard = math.inf, GUARD_SILENCE, now[0] - GUARD_SILENCE + 0.002
     served.run()
     assert waits == pytest.approx([0.015, 0.004, 0.002])
 

@@ -1,4 +1,4 @@
-"""World of the four processes: program, guard, driver process or guard watchdog, and the controller.
+"""World of the processes: program, guard, driver process or two guard watchdogs, and the controller.
 
 A model of its own that shares no code with them, only their limits. Each process may crash, freeze and go on, each beat
 may be lost, the network may be cut, the skin may be touched. What each does about it is written down here as the pages
@@ -11,7 +11,7 @@ import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
-from coneskin.robot.driver.messages import HEARTBEAT_TIMEOUT
+from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, UNGUARDED_TIME
 from coneskin.robot.stop.limits import MonitoringLimits
 
 __all__ = ["PROCESS_INVARIANTS", "Parts", "ProcessWorld"]
@@ -19,7 +19,6 @@ __all__ = ["PROCESS_INVARIANTS", "Parts", "ProcessWorld"]
 _TICK = 0.05  # s; no limit is finer
 _MOST_WRONG = 2  # processes or lines at once, beside lost beats
 _MOST_LOST = 2  # beats of one line in a row that may be lost while nobody needs to stop
-_SESSION_TIMEOUT = 1.0  # s
 _STOP_TICKS = 1  # in which an arm that was told to has stopped
 
 
@@ -40,16 +39,20 @@ class Parts:
     """What there is to miss each other; one taken away shows what it is for.
 
     Attributes:
-        program_silence, process_silence, guard_silence: longest silences [s]; infinite where nobody listens.
-        session_silence: after which the program's own process holds the arm, with external control [s].
+        program_silence: for which a program may be suspended [s]; infinite where nobody looks.
+        process_silence: of the helper [s]; infinite where nobody listens.
+        hold_up: the same, where this computer lets it wait for a processor [s].
+        guard_silence: of the guard, as its helper hears it [s].
+        second_silence: the same, as the second watchdog hears it, with external control [s].
         watchdog: after which the controller ends a program that hears nothing [s]: with internal control that of the
             driver process, with external control one with the lines of ``coneskin heartbeat``.
     """
 
     program_silence: float = MonitoringLimits().program_silence
     process_silence: float = MonitoringLimits().process_silence
-    guard_silence: float = HEARTBEAT_TIMEOUT
-    session_silence: float = _SESSION_TIMEOUT
+    guard_silence: float = GUARD_SILENCE
+    hold_up: float = HOLD_UP_LIMIT
+    second_silence: float = UNGUARDED_TIME
     watchdog: float = 0.25
 
 
@@ -58,13 +61,14 @@ PROCESS_INVARIANTS = {
     "touched": "A touch under a guard that lives stops the arm in the same tick.",
     "unguarded": "An arm without a guard that lives moves no longer than the first who misses it needs.",
     "frozen": "An arm whose program, driver process or watchdog is gone moves no longer than its limit.",
+    "held up": "A helper that waits for a processor for a short while stops nothing.",
     "cut": "An arm behind a cut network moves no longer than the controller's watchdog, where its program heeds that.",
     "patient": "Up to two beats in a row that are lost stop nothing.",
     "released": "An arm moves again only after a reset, while guard and helper live.",
     "back to active": "From every state a person who starts again what is gone gets back to active.",
 }
 
-_ALIVE, _FROZEN, _DEAD = "alive", "frozen", "dead"
+_ALIVE, _FROZEN, _DEAD, _HELD_UP = "alive", "frozen", "dead", "held up"
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,7 @@ class _State:
     program: str = _ALIVE
     guard: str = _ALIVE
     helper: str = _ALIVE
+    second: str = _ALIVE  # of the watchdogs; with internal control it is not there, and nothing happens to it
     cut: bool = False
     moves: bool = True
     latched: bool = False
@@ -81,7 +86,7 @@ class _State:
     program_age: int = 0  # as the guard hears it
     helper_age: int = 0
     guard_age: int = 0  # as the helper hears it
-    session_age: int = 0  # as the program hears the guard
+    second_age: int = 0  # as the second watchdog hears the guard
     kick_age: int = 0  # as the controller hears the driver process, or the guard's count
     wrong_for: int = 0  # ticks that the arm has moved since the newest thing went wrong
     lost: int = 0  # beats in a row that were lost
@@ -112,18 +117,25 @@ class ProcessWorld:
     def helps(self, action: str) -> bool:
         return action in ("tick", "reset", "free", "mend the network") or action.startswith(("thaw", "restart"))
 
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return (
+            ("program", "guard", "helper") if self.control == "internal" else ("program", "guard", "helper", "second")
+        )
+
     def _wrong(self) -> int:
         state = self.state
-        return sum(one != _ALIVE for one in (state.program, state.guard, state.helper)) + state.cut
+        return sum(one != _ALIVE for one in (state.program, state.guard, state.helper, state.second)) + state.cut
 
     def actions(self) -> Sequence[str]:
         state, found = self.state, ["tick"]
         more = self._wrong() < _MOST_WRONG
-        for name in ("program", "guard", "helper"):
+        for name in self._names:
             how = getattr(state, name)
-            found += [f"thaw {name}"] if how == _FROZEN else []
+            found += [f"thaw {name}"] if how in (_FROZEN, _HELD_UP) else []
             found += [f"freeze {name}", f"kill {name}"] if how == _ALIVE and more else []
-        found += ["restart"] if _DEAD in (state.program, state.guard, state.helper) else []
+        found += ["hold helper"] if state.helper == _ALIVE and more else []
+        found += ["restart"] if _DEAD in (state.program, state.guard, state.helper, state.second) else []
         found += ["mend the network"] if state.cut else ["cut the network"] if more else []
         found += ["free"] if state.touched else ["touch"]
         found += ["reset"] if state.latched else []
@@ -135,6 +147,8 @@ class ProcessWorld:
         match action.split():
             case ["freeze", name]:
                 self.state = replace(before, **{name: _FROZEN}, wrong_for=0)
+            case ["hold", name]:
+                self.state = replace(before, **{name: _HELD_UP}, wrong_for=0)
             case ["kill", name]:
                 self.state = replace(before, **{name: _DEAD}, wrong_for=0)
             case ["thaw", name]:
@@ -156,19 +170,23 @@ class ProcessWorld:
         state = self.state
         parts, heard = self.parts, not state.cut
         fine = state.program_age <= _ticks(parts.program_silence) and state.helper_age <= _ticks(parts.process_silence)
-        lives = state.program == state.guard == state.helper == _ALIVE
+        lives = state.program == state.guard == state.helper == state.second == _ALIVE
         if lives and fine and heard and not state.touched:
             self.state = replace(state, latched=False, moves=True, wrong_for=0)
 
     def _tick(self, lost: bool) -> list[str]:
         """Let a tick pass: beats, what each notices, and what comes of it."""
         state, parts, internal = self.state, self.parts, self.control == "internal"
-        guard, helper, program = state.guard == _ALIVE, state.helper == _ALIVE, state.program == _ALIVE
+        guard, helper, second = state.guard == _ALIVE, state.helper == _ALIVE, state.second == _ALIVE
+        # whoever waits for a processor is runnable, which the guard sees
+        process_silence = (
+            max(parts.process_silence, parts.hold_up) if state.helper == _HELD_UP else parts.process_silence
+        )
         hears = {
-            "program_age": (program and guard and not lost, parts.program_silence),
-            "helper_age": (helper and guard and not lost, parts.process_silence),
+            "program_age": (state.program != _FROZEN and guard, parts.program_silence),  # looked at: no beat is lost
+            "helper_age": (helper and guard and not lost, max(parts.process_silence, parts.hold_up)),
             "guard_age": (guard and helper and not lost, parts.guard_silence),
-            "session_age": ((guard and program and not lost) or internal, parts.session_silence),
+            "second_age": ((guard and second and not lost) or internal, parts.second_silence),
             "kick_age": ((helper if internal else guard) and not state.cut, parts.watchdog),
         }
         age = {
@@ -180,8 +198,8 @@ class ProcessWorld:
         reaches = not state.cut
         if guard:
             silent = age["program_age"] > _ticks(parts.program_silence)
-            silent |= age["helper_age"] > _ticks(parts.process_silence)
-            gone = _DEAD in (state.program, state.helper)  # their channels have ended
+            silent |= age["helper_age"] > _ticks(process_silence)
+            gone = _DEAD in (state.program, state.helper, state.second)  # their channels have ended
             states_silent = state.cut
             if state.touched or silent or gone or states_silent:
                 stop, latch = reaches, True
@@ -191,9 +209,9 @@ class ProcessWorld:
             ):
                 stop = stop or reaches
             stop |= reaches and internal and state.program == _DEAD
-        if program and not internal:
-            ended = state.guard == _DEAD and parts.session_silence < math.inf
-            stop |= reaches and (ended or age["session_age"] > _ticks(parts.session_silence))
+        if second and not internal:
+            ended = state.guard == _DEAD and parts.second_silence < math.inf
+            stop |= reaches and (ended or age["second_age"] > _ticks(parts.second_silence))
         if age["kick_age"] > _ticks(parts.watchdog):
             stop = True
         moves = state.moves and not stop
@@ -217,7 +235,7 @@ class ProcessWorld:
 
     def _judge(self, before: _State, lost: bool) -> list[str]:
         state, internal, broken = self.state, self.control == "internal", []
-        alive = {name for name in ("program", "guard", "helper") if getattr(state, name) == _ALIVE}
+        alive = {name for name in self._names if getattr(state, name) == _ALIVE}
         if state.moves and state.touched and "guard" in alive and not state.cut:
             broken.append("touched: it moves on")
         if state.moves and before.latched and not before.moves:
@@ -229,13 +247,20 @@ class ProcessWorld:
             pass  # nothing reaches the controller, and its program does not heed that: said in docs/safety.md
         elif "guard" not in alive:
             limits = [0.5] if "helper" in alive else []
-            limits += [1.0] if "program" in alive and not internal else []
+            limits += [1.0] if "second" in alive and not internal else []
             if self.parts.watchdog < math.inf and (not internal or "helper" not in alive):
                 limits.append(0.25)  # the controller's own
             if limits and longest > _ticks(min(limits)) + _STOP_TICKS:
                 broken.append(f"unguarded: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
-        elif alive != {"program", "guard", "helper"} and longest > _ticks(0.2) + _STOP_TICKS:
+        elif state.helper == _HELD_UP and alive == {*self._names} - {"helper"}:
+            if longest > _ticks(0.5) + _STOP_TICKS:
+                broken.append(f"frozen: it moves for {longest * _TICK:.2f} s beside a helper that is held up")
+        elif alive | {"second"} != {*self._names, "second"} and longest > _ticks(0.2) + _STOP_TICKS:
             broken.append(f"frozen: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
+        early = state.helper == _HELD_UP and self._wrong() == 1 and before.wrong_for <= _ticks(0.2)
+        early &= state.helper_age <= _ticks(0.2) + 1 and (not internal or self.parts.watchdog > 0.25)
+        if before.moves and not state.moves and early and not (state.touched or _were_wrong(before)):
+            broken.append("held up: it is stopped although its helper only waits for a processor")
         if before.moves and not state.moves and not (self._wrong() or state.touched or _were_wrong(before)):
             broken.append("patient: it is stopped although nothing is wrong")
         return broken
@@ -243,4 +268,4 @@ class ProcessWorld:
 
 def _were_wrong(state: _State) -> bool:
     """Tell whether an age tells of something that was wrong a moment ago."""
-    return max(state.program_age, state.helper_age, state.guard_age, state.session_age, state.kick_age) > _MOST_LOST
+    return max(state.program_age, state.helper_age, state.guard_age, state.second_age, state.kick_age) > _MOST_LOST

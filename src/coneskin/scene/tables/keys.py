@@ -195,8 +195,8 @@ MONITORING_KEYS = with_meanings(
     escalate_ms: without a slowdown for this long after a stop, the next stop path is used
     standstill_rad_s: joint speed below which the arm stands
     settle_ms: time for which all preconditions must hold without a break before the guard becomes active
-    program_silence_ms: longest time without a heartbeat of your program. A third more holds for the driver process
-        or the guard watchdog, and for a request of the program on its way
+    program_silence_ms: longest time for which your program may be suspended. A third more holds for the heartbeat of
+        driver process or guard watchdog, and for a request
     """,
     Key("skin_silence_ms", float, None, low=2.0, high=1000.0),
     Key("skin_late_ms", float, None, low=2.0, high=1000.0),
