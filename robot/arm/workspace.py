@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
 from .kinematics import LINK_INDEX, dh_mesh, link_poses
@@ -119,9 +120,13 @@ def skeleton(model: ArmModel, q: Sequence[float]) -> list[Vector]:
 @functools.lru_cache(maxsize=32)
 def _tubes(model: ArmModel) -> tuple[tuple[int, Vector, Vector], ...]:
     """Return index of the DH frame, and both ends of the axis in it [m], of upper arm and forearm."""
-    tubes = []
+    tubes: list[tuple[int, Vector, Vector]] = []
     for name, length in (("upper_arm", abs(model.a[1])), ("forearm", abs(model.a[2]))):
-        mesh = dh_mesh(model, name)
+        try:
+            mesh = dh_mesh(model, name)
+        except KinematicsError:  # good enough for a picture; a `Workspace` refuses such an arm
+            tubes.append((LINK_INDEX[name], (length, 0.0, 0.0), (0.0, 0.0, 0.0)))
+            continue
         tubes.append((LINK_INDEX[name], mesh.translation, mesh.apply((0.0, 0.0, length))))
     return tuple(tubes)
 
@@ -221,10 +226,16 @@ class Workspace:
     Attributes:
         model: the arm.
         table: plane below which it must not go, or None.
+
+    Raises:
+        KinematicsError: it is not known where the arm's links are beside the lines of its DH table.
     """
 
     model: ArmModel
     table: TablePlane | None = None
+
+    def __post_init__(self) -> None:
+        dh_mesh(self.model, "forearm")
 
     def obstruction(self, q: Sequence[float], qd: Sequence[float], braking: float) -> str:
         """Return what is in the way of joints that move so, braking distance included; empty where nothing is.

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, link_poses
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
@@ -322,3 +323,9 @@ def test_giving_way_is_bounded_too() -> None:
     assert isinstance(over, Done)
     why = "a point of the arm has moved 100 mm, as far as arm_distance_mm lets it"
     assert over.reason == f"{why}, before the touched one had moved 50 mm"
+
+
+def test_an_arm_whose_links_are_not_known_has_no_workspace() -> None:
+    with pytest.raises(KinematicsError, match="meshes are known for UR3"):
+        Workspace(arm_model("UR15"))
+    assert len(skeleton(arm_model("UR15"), ZERO_VELOCITY)) == 9

@@ -56,8 +56,8 @@ ARM_KEYS = with_meanings(
         of coneskin (external)
     table_z_mm: height in the base frame below which the middle of no link goes in a retreat. Add the thickness of
         the arm and the length of the tool
-    slider_stop: the guard takes the controller's speed slider, and sets it to 0 where other stops do not work. Set
-        it to false for a program that needs the slider, such as one with ur_rtde's `RTDEIOInterface`
+    slider_stop: the guard takes the controller's speed slider, and sets it to 0, where other stops do not work. Set
+        it to false for a program that must keep the slider, such as one with ur_rtde's `RTDEIOInterface`
     speed_limit_from: file of permissible speeds that `coneskin permissible` has written. The guard keeps them by
         the speed slider. The file is void after a change of arm, sheets, padding or reactions
     controller_heartbeat: with `control = "external"`: whether a program must end by itself where the guard falls
