@@ -36,6 +36,9 @@ class FieldChoice:
     Args:
         client: viser's ``ClientHandle``.
         stages: on the page, each with the name of the node above it.
+
+    Attributes:
+        on_update: has a function called when the viewer chooses.
     """
 
     def __init__(self, client: Any, stages: list[tuple[Stage, str]]) -> None:
@@ -44,10 +47,7 @@ class FieldChoice:
         self._nodes: dict[str, Any] = {}
         self._choice = client.gui.add_dropdown("potential", (_FIELD_OFF, *PHASES), initial_value=_FIELD_OFF)
         self._legend = client.gui.add_html("")
-
-    def on_update(self, changed: Any) -> None:
-        """Have a function called when the viewer chooses."""
-        self._choice.on_update(changed)
+        self.on_update = self._choice.on_update
 
     def stand(self, stages: list[tuple[Stage, str]]) -> None:
         """Take other stages in the place of those before."""

@@ -229,9 +229,7 @@ class History:
 
     def health(self, time: float) -> str:
         """Return the last thing that was wrong up to a time, since the guard last became active; empty for none."""
-        for event in reversed(self.events):
-            if event.time > time:
-                continue
+        for event in reversed([event for event in self.events if event.time <= time]):
             if event.name == EventName.ACTIVATED:
                 return ""
             if event.name in _HEALTH_EVENTS:

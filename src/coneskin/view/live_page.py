@@ -32,9 +32,7 @@ _SEARCH_PERIOD = 0.3  # s between two looks for a guard
 _SEARCH_SILENCE = 1.0  # s without news after which a newer run is looked for
 _TIMELINE_SPAN = 20.0  # s of the timeline
 _MAX_LISTED_EVENTS = 200  # events that are put into words
-_AT_REST = (
-    '<div class="coneskin-card">No guard records a run: what is drawn is at rest. One that begins is shown.</div>'
-)
+_AT_REST = '<div class="coneskin-card">No guard records a run: the arm is drawn at rest until one begins.</div>'
 
 
 class LivePage:

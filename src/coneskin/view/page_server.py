@@ -122,7 +122,8 @@ class PageServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def look_from(self, position: tuple[float, float, float], at: tuple[float, float, float]) -> None:
         """Set from where a new viewer looks, and at what [m]."""
@@ -149,11 +150,6 @@ class PageServer:
 
         self._server.on_client_connect(connected)
         self._server.on_client_disconnect(gone)
-
-    def close(self) -> None:
-        """End the server."""
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
 
 
 def _check_address(host: str) -> None:
