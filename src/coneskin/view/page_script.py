@@ -111,7 +111,7 @@ _PANEL_SCRIPT = """
 })();
 """
 # viser smooths edges and copies each picture for a server that may ask. Without a GPU the first takes a third of a
-# picture's time (bench/RESULTS.md), so a worker asks what draws, while the page is still read.
+# picture's time (measured at 13b7922), so a worker asks what draws, while the page is still read.
 _PLAIN_EDGES_SCRIPT = """
 (function () {
   const plain = HTMLCanvasElement.prototype.getContext;

@@ -42,7 +42,7 @@ def light_plainly(scene: Any) -> None:
     """Set two plain lights in the place of viser's own.
 
     Reflections of its surroundings and shadows of three cascades cost two thirds of a picture where a processor draws
-    it (bench/RESULTS.md).
+    it (measured at 13b7922).
 
     Args:
         scene: viser's ``SceneApi``.
