@@ -17,6 +17,7 @@ import argparse
 import json
 import os
 import random
+import socket
 import subprocess
 import sys
 import tempfile
@@ -87,6 +88,15 @@ def program(scene: str, recording: str, hold: float) -> None:
                         say(name="refused reset", why=str(refused))
 
 
+def unlock(host: str) -> None:
+    """Release a protective stop, as a person does at the controller's screen."""
+    with socket.create_connection((host, 29999), 5.0) as dashboard:
+        dashboard.recv(1024)
+        for line in (b"close safety popup\n", b"unlock protective stop\n"):
+            dashboard.sendall(line)
+            dashboard.recv(1024)
+
+
 def say(**facts: Any) -> None:
     sys.stdout.write(json.dumps(facts, default=str) + "\n")  # whole, because two threads say something
     sys.stdout.flush()
@@ -108,7 +118,7 @@ def main() -> None:
     with ExitStack() as stack:
         folder = args.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder.mkdir(exist_ok=True)
-        controller = SimulatedController("UR5e", free_host(), START, log=folder / "log.jsonl")
+        controller = SimulatedController("UR5e", free_host(), START, log=folder / "log.jsonl", unlock_after=0.0)
         stack.enter_context(controller)
         give_precedence(controller.pid)
         skin = Child("-m", "bench.faults.virtual_skin", str(folder / "port"), str(args.seed), "ladder", "1")
@@ -128,7 +138,7 @@ def main() -> None:
             event = run.hear(0.05)
             if event:
                 events.append(event)
-                if event["name"] not in ("moves", "arrived"):
+                if event["name"] not in ("moves", "arrived", "refused", "refused reset"):
                     print(f"{CLOCK() - began:8.2f} s  {event}", flush=True)
             name = event.get("name")
             if name == "moves":
@@ -137,6 +147,8 @@ def main() -> None:
                     next_touch = float("inf")
             elif name in ("arrived", "stopping", "raised"):
                 moving_since = None
+            elif name == "refused" and "safety system" in str(event["reasons"]):
+                unlock(controller.host)
             if moving_since is not None and CLOCK() >= next_touch:
                 moving_since = None
                 asked = {"u": 0.13, "phi": LEADING_SIDE, "after": 0.0, "duration": 0.2, "force": 5.0, "rise": 0.01}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.marks import MIN_MARKS, MIN_POWER, _azimuth_margin, _slant_places, plan_marks
+from coneskin.commissioning.acceptance.marks import MIN_POWER, _azimuth_margin, _slant_places, plan_marks
 from coneskin.commissioning.misreadings import (
     RIGHT,
     WRONG,
@@ -21,6 +21,7 @@ from coneskin.commissioning.misreadings import (
 )
 from coneskin.commissioning.touching import Mark
 from coneskin.geometry.frustum import Frustum
+from coneskin.scene.commissioning_record import MIN_MARKS
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.sensor import Sensor
 

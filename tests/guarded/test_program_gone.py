@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import RobotRefused
+from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
 from coneskin.testing.scenes import GOAL, START
 
@@ -98,6 +99,23 @@ def test_a_program_that_has_forked_and_is_killed_stops_its_arm(controller, tmp_p
         assert program.process.wait(DEADLINE) == -signal.SIGKILL
         controller.wait_for_standstill()
         until(lambda: not any(map(lives, program.children)))
+
+
+@pytest.mark.parametrize("ending", ["sys.exit(0)", "raise RuntimeError('of a child')", "g.close()"])
+def test_a_fork_that_leaves_the_with_touches_nothing_of_the_run(controller, tmp_path, ending):
+    """It wrote what its parent had collected into the parent's recording once more, and an end."""
+    body = f"import os\n    for _ in range(20):\n        if os.fork() == 0: {ending}; os._exit(0)\n        os.wait()"
+    with Program(
+        tmp_path, scene_text(controller.host, {"[reaction]": '[recording]\nfolder = "runs"\n[reaction]'}), body
+    ) as program:
+        assert program.process.wait(DEADLINE) == 0
+    run = read_run(next(tmp_path.glob("runs/*")))
+    assert run.missing == ""
+    assert run.replay().same
+    assert [event.name for event in run.events if event.name in ("stopping", "fault", "activated")] == [
+        "activated",
+        "stopping",
+    ]
 
 
 @pytest.mark.promise("P50")

@@ -172,7 +172,7 @@ def test_a_new_calibration_makes_a_commissioning_void(tmp_path: Path) -> None:
     file = tmp_path / "calibrations" / "device-7.json"
     add_calibration(file, 7, a_record())
     scene = load_scene(saved(tmp_path))
-    marks = (MarkResult("skin", "here", 1.0, 2.0, 1.0, 2.0, 0.0, 0.5, 1, True),)
+    marks = tuple(MarkResult("skin", "here", u, 2.0, u, 2.0, 0.0, 0.5, 1, True) for u in (1.0, 2.0, 3.0, 4.0, 5.0))
     write_record(
         scene, CommissioningRecord("2026-11-22T10:00:00+00:00", "0.1.0", fingerprint(scene), True, "", "", marks)
     )

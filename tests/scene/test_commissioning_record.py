@@ -48,9 +48,38 @@ def test_a_record_that_passed_is_valid(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
     path = write_passed_record(scene)
     assert path == tmp_path / "scene.commissioning.json"
-    assert known(scene) == Commissioning(True, f"passed on {datetime.now(UTC):%Y-%m-%d} by a test, 1 marks")
+    assert known(scene) == Commissioning(True, f"passed on {datetime.now(UTC):%Y-%m-%d} by a test, 5 marks")
     assert known(scene, 3650.0).valid, "without max_age_days it stays valid"
     assert [item.name for item in tmp_path.iterdir() if "part" in item.name] == []
+
+
+@pytest.mark.promise("P12")
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"marks": 4}, "marks at 4 places, and 5 are needed"),
+        ({"u_mm": 7.0, "read_u_mm": 7.0}, "marks at 1 places, and 5 are needed"),
+        ({"sensor": "a sensor that is not there"}, "marks on 2 sensors, and the scene has 1"),
+        ({"read_u_mm": 90.0}, "was read 90 mm and 0 deg off, 20 mm and 25 deg are allowed"),
+        ({"read_phi_deg": -30.0}, "was read 0 mm and 30 deg off"),
+        ({"read_u_mm": float("nan")}, "was read nan mm"),
+        ({"level": 0.0}, "has the level 0, at which nothing touches"),
+    ],
+)
+def test_a_record_that_says_it_has_passed_and_is_not_complete_is_of_no_use(tmp_path: Path, change, said) -> None:
+    """One mark for two sensors, a sensor that is not there, 90 mm off but passed, level 0: all were taken."""
+    scene = scene_in(tmp_path)
+    table = json.loads(write_passed_record(scene).read_text())
+    table["marks"] = table["marks"][: change.get("marks", 5)]
+    for number, mark in enumerate(table["marks"]):
+        if "u_mm" in change or not number:
+            mark.update({name: value for name, value in change.items() if name != "marks"})
+    if "sensor" in change:
+        table["marks"].append({**table["marks"][1]})
+    _record_path(scene).write_text(json.dumps(table))
+    found = known(scene)
+    assert not found.valid
+    assert said in found.note
 
 
 def test_without_a_record_it_says_what_to_do(tmp_path: Path) -> None:

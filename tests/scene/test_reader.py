@@ -71,10 +71,10 @@ def with_changes(text: str, *changes: tuple[str, str]) -> str:
         ('host = "127.0.0.1"', 'host = " "', "arm.host must name the controller"),
         ('host = "127.0.0.1"', 'host = "a"\nwatchdog_hz = 0', "arm.watchdog_hz must be from 1 to 100 Hz, got 0.0 Hz"),
         ('name = "forearm"', 'name = "tail"', "link tail: an arm has no such link; it has base, shoulder, upper_arm"),
-        ('name = "forearm"', 'name = "forearm"\nmesh = "no.stl"', "link forearm.mesh: there is no file no.stl"),
-        ('name = "forearm"', 'name = "forearm"\nmesh = ""', "link forearm.mesh: there is no file"),
-        ('name = "forearm"', f'name = "forearm"\nmesh = "{"a" * 5000}"', "link forearm.mesh: there is no file"),
-        ('name = "forearm"', 'name = "forearm"\nmesh = "a\\u0000b"', "link forearm.mesh: there is no file"),
+        ('name = "forearm"', 'name = "forearm"\nmesh = "no.stl"', "link forearm.mesh: there is no regular file no.stl"),
+        ('name = "forearm"', 'name = "forearm"\nmesh = ""', "link forearm.mesh: there is no regular file"),
+        ('name = "forearm"', f'name = "forearm"\nmesh = "{"a" * 5000}"', "link forearm.mesh: there is no regular file"),
+        ('name = "forearm"', 'name = "forearm"\nmesh = "a\\u0000b"', "link forearm.mesh: there is no regular file"),
         ('name = "forearm"', 'name = "forearm"\nframe = "tool"', "link forearm.frame must be one of mesh, urdf, dh"),
         ('name = "forearm"', "", "link 1: the key name is missing"),
         ("radius1_mm = 38", "radius1_m = 0.038", "unknown key radius1_m; did you mean radius1_mm?"),
@@ -203,7 +203,7 @@ def test_a_sensor_file_is_taken_the_scene_wins_and_a_recording_carries_it(tmp_pa
 
 def test_a_recorded_scene_does_without_its_mesh(tmp_path: Path) -> None:
     text = SKIN_ONLY.replace('name = "tube"', 'name = "tube"\nmesh = "gone.stl"')
-    assert mistakes(text, tmp_path) == [f"link tube.mesh: there is no file {tmp_path / 'gone.stl'}"]
+    assert mistakes(text, tmp_path) == [f"link tube.mesh: there is no regular file {tmp_path / 'gone.stl'}"]
     assert parse_scene(text, "my.toml", tmp_path, recorded=True).sensors
 
 

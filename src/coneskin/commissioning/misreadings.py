@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from coneskin.scene.commissioning_record import MAX_MISS
+
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
@@ -27,8 +29,7 @@ __all__ = [
 ]
 
 _FULL_TURN = 2.0 * math.pi  # rad
-_MAX_ALONG, _PART_ALONG = 0.020, 0.2  # m, and part of the slant: how well a person finds a mark along the link
-_MAX_AROUND, _PART_AROUND = math.radians(25.0), 0.2  # rad, and part of the wrap: the same about the link
+_MAX_PART = 0.2  # part of the slant, and of the wrap: how well a person finds a mark on a small sensor
 _MIN_OFFSET_READINGS = 3  # readings; fewer can be explained by an offset too easily
 
 
@@ -85,7 +86,8 @@ WRONG = (
 def tolerance(sensor: Sensor) -> _Tolerance:
     """Return how far from its mark a reading may be: 20 mm and 25 deg, less on a small sensor."""
     cone = sensor.frustum
-    return _Tolerance(min(_MAX_ALONG, _PART_ALONG * cone.slant), min(_MAX_AROUND, _PART_AROUND * cone.wrap))
+    along, around = MAX_MISS
+    return _Tolerance(min(along, _MAX_PART * cone.slant), min(around, _MAX_PART * cone.wrap))
 
 
 def misread(sensor: Sensor, wrong: _Misreading, place: Place) -> Place:

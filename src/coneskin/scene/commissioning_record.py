@@ -7,6 +7,7 @@ out on this skin, on this link; it is no lock, and a record that was edited by h
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from .values.scene import PlacedSensor, Scene
 
 __all__ = [
+    "MAX_MISS",
+    "MIN_MARKS",
     "CommissioningRecord",
     "MarkResult",
     "fingerprint",
@@ -29,6 +32,8 @@ __all__ = [
     "write_record",
 ]
 
+MIN_MARKS = 5  #: marks on each sensor
+MAX_MISS = (0.020, math.radians(25.0))  #: m along the link, and rad about it, by which a mark may be misread at most
 _CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
 _MAX_BYTES = 1 << 20  # of a record
 _DAY_SECONDS = 86400.0  # s
@@ -195,6 +200,8 @@ def _check(scene: Scene, now: float) -> Commissioning:
             "another now"
         )
         return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {_HOW_TO}")
+    if flaw := _flaw(scene, record):
+        return Commissioning(False, f"the commissioning of {day} is not complete, {flaw}: {_HOW_TO}")
     limit = scene.commissioning_max_age
     if limit is not None and age * _DAY_SECONDS > limit:
         allowed = f"{limit / _DAY_SECONDS:g} days are allowed (commissioning.max_age_days)"
@@ -205,3 +212,24 @@ def _check(scene: Scene, now: float) -> Commissioning:
         )
     by = f" by {record.by}" if record.by else ""
     return Commissioning(True, f"passed on {day}{by}, {len(record.marks)} marks")
+
+
+def _flaw(scene: Scene, record: CommissioningRecord) -> str:
+    """Return what a record lacks that says it has passed; empty where it shows what it has to. Names do not matter."""
+    touched = list(dict.fromkeys(mark.sensor for mark in record.marks))
+    if len(touched) != len(scene.sensors):
+        return f"it has marks on {len(touched)} sensors, and the scene has {len(scene.sensors)}"
+    for name in touched:
+        marks = [mark for mark in record.marks if mark.sensor == name]
+        places = {(mark.u_mm, mark.phi_deg) for mark in marks}
+        if len(places) < MIN_MARKS:
+            return f"{name} has marks at {len(places)} places, and {MIN_MARKS} are needed"
+        for mark in marks:
+            along = 1e-3 * abs(mark.read_u_mm - mark.u_mm)
+            around = abs(math.remainder(math.radians(mark.read_phi_deg - mark.phi_deg), 2.0 * math.pi))
+            if not (along <= MAX_MISS[0] and around <= MAX_MISS[1]):
+                off = f"{1e3 * along:.0f} mm and {math.degrees(around):.0f} deg"
+                return f"a mark on {name} was read {off} off, {1e3 * MAX_MISS[0]:g} mm and 25 deg are allowed"
+            if not mark.level > 0.0:
+                return f"a mark on {name} has the level {mark.level:g}, at which nothing touches"
+    return ""

@@ -9,6 +9,7 @@ channel. The death of a child shows as the end of its channel, and ends in a sto
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -106,6 +107,7 @@ class Session:
         self._processes = ChildProcesses()
         self._arm: UrRtdeArm | None = None
         self._resets = 0  # asked for so far
+        self._owner = os.getpid()
 
     @property
     def events(self) -> list[GuardEvent]:
@@ -160,10 +162,13 @@ class Session:
     def close(self) -> None:
         """Stop the arm, end the children and close the recording; may be called again.
 
+        In a forked copy of the program, which leaves the ``with`` too, nothing happens: all of it is the program's.
+
         Raises:
             KeyboardInterrupt: a person has interrupted meanwhile; all of it is done nevertheless.
         """
-        _defer_interrupts(self._close)
+        if os.getpid() == self._owner:
+            _defer_interrupts(self._close)
 
     def _close(self) -> None:
         self._processes.end(lambda: stands(self._log.events))

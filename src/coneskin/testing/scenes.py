@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from coneskin.scene.commissioning_record import CommissioningRecord, MarkResult, fingerprint, write_record
+from coneskin.scene.commissioning_record import MIN_MARKS, CommissioningRecord, MarkResult, fingerprint, write_record
 from coneskin.scene.values.scene import Commissioning, Scene
 
 __all__ = ["ESCALATE", "GOAL", "START", "commissioned", "forearm_scene", "start_with", "write_passed_record"]
@@ -69,7 +69,9 @@ def commissioned(scene: Scene) -> Scene:
 def write_passed_record(scene: Scene) -> Path:
     """Write a record beside a scene's file as if it had been commissioned now, and return its path."""
     marks = tuple(
-        MarkResult(item.sensor.name, "nowhere", 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1, True) for item in scene.sensors
+        MarkResult(item.sensor.name, "nowhere", u, 0.0, u, 0.0, 0.0, 1.0, 1, True)
+        for item in scene.sensors
+        for u in map(float, range(MIN_MARKS))
     )
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return write_record(scene, CommissioningRecord(now, "", fingerprint(scene), True, "", "a test", marks))

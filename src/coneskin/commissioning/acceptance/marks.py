@@ -16,6 +16,7 @@ from coneskin.commissioning.misreadings import power, shifts
 from coneskin.commissioning.touching import Mark
 from coneskin.robot.arm.vectors import added, cross, scaled
 from coneskin.scene.build import place_on_arm
+from coneskin.scene.commissioning_record import MIN_MARKS
 
 if TYPE_CHECKING:
     from coneskin.geometry.pose import Pose, Vector
@@ -24,9 +25,8 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["MIN_MARKS", "MIN_POWER", "offer_marks", "place_sensors", "plan_marks"]
+__all__ = ["MIN_POWER", "offer_marks", "place_sensors", "plan_marks"]
 
-MIN_MARKS = 5  #: marks on each sensor
 MIN_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
 _MAX_MARKS = 9
 _SLANT_PARTS = (0.2, 0.5, 0.8)  # parts of the slant at which there are marks

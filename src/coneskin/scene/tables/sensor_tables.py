@@ -324,7 +324,7 @@ def read_links(tables: Mapping[str, Any], folder: Path | None, problems: list[st
         sensors = tuple(PlacedSensor(*item) for item in built if item is not None)
         mesh = None if values["mesh"] is None else (folder or Path()) / values["mesh"]
         if mesh is not None and folder is not None and not os.path.isfile(mesh):
-            problems.append(f"{where}.mesh: there is no file {mesh}")
+            problems.append(f"{where}.mesh: there is no regular file {mesh}")
         links.append(LinkScene(values.get("name", str(number)), values["frame"], mesh, sensors))
     return tuple(links)
 
