@@ -70,6 +70,7 @@ BENCHES = {
     "wire": Bench("bench.skin.wire", "Ports, and the guard behind the detector."),
     "sources": Bench("bench.skin.sources", "Real ports: both are pseudo-terminals."),
     "virtual-skin": Bench("bench.skin.virtual_skin", _SIMULATED_SKIN),
+    "as-built": Bench("bench.skin.as_built", "Wrinkles, worn foils, cold; contacts are discs."),
     "calibrate": Bench("bench.skin.calibrate", "What a finger and an uneven sheet add: contacts are points."),
     "decode": Bench("bench.decode.accuracy", _SIMULATED_SKIN + " Sheets are uniform.", one_thread=True),
     "decode-faults": Bench("bench.decode.faults", _SIMULATED_SKIN),

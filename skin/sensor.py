@@ -16,6 +16,7 @@ from coneskin.geometry.frustum import Frustum
 
 from .electronics import Electronics, Polarity, Thresholds, match_electronics
 from .sheet_functions import LogScale
+from .tolerance import FILM_SHEETS, SheetTolerance
 
 if TYPE_CHECKING:
     from .calibration import ForceTable, PlaceMap
@@ -82,6 +83,7 @@ class Sensor:
         name: what people call it; by default its numbers.
         place_map: what its calibration takes off the places that it reads; None where it has none.
         force_table: what force its level stands for; None where no calibration has shown it.
+        tolerance: what is not ideal about its sheets and not taken off by its calibration.
         bounds: its limits in counts, for the live path.
         b_positive: B, not A, is at the supply in the radial phase.
         c_positive: C, not D, is at the supply in the angular phase.
@@ -102,6 +104,7 @@ class Sensor:
     name: str = ""
     place_map: PlaceMap | None = None
     force_table: ForceTable | None = None
+    tolerance: SheetTolerance = FILM_SHEETS
     bounds: Bounds = field(init=False, repr=False, compare=False)
     _from_end1: LogScale = field(init=False, repr=False, compare=False)
     _from_end2: LogScale = field(init=False, repr=False, compare=False)

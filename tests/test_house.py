@@ -72,6 +72,7 @@ HOMES = {
         "geometry/mesh.py",
         "skin/field/*.py",
         "skin/virtual/field_contacts.py",
+        "skin/virtual/built_sheets.py",
         "tests/support/field/*.py",
         "src/coneskin/design/link_picture.py",
         "src/coneskin/design/workshop/placement.py",
@@ -80,11 +81,11 @@ HOMES = {
 #: the live path: no numpy in any of it
 HOT = {
     "src/coneskin/core": "channel recording/block",
-    "skin": "wire sensor",
+    "skin": "wire sensor tolerance",
     "skin/sources": "source serial_port kinds",
     "skin/detection": "stream detector events",
     "skin/detection/frame": "contact_matrix reading timing untouched",
-    "skin/detection/place": "touch_place place_estimate single_contact seam_contact",
+    "skin/detection/place": "touch_place touch_filter place_estimate single_contact seam_contact",
     "robot/arm": "kinematics compiled_kinematics damped_least_squares vectors workspace",
     "robot/reaction": "retreat types",
     "robot/guard": "core phase arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "

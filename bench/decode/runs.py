@@ -21,6 +21,7 @@ from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import IDEAL_SHEETS, SheetTolerance
 from tests.support.field.converter_plant import ConverterPlant
 from tests.support.field.flat_plant import FlatPlant
 
@@ -40,6 +41,7 @@ class Sitting:
         touches: counts, shape (touches, frames, 10).
         drift: standard deviation by which untouched currents may drift from one frame of a touch to the next, as the
             decoder is told, a ratio; 0: its own default.
+        tolerance: of the sheets, as the decoder is told.
     """
 
     plant: FlatPlant
@@ -47,6 +49,7 @@ class Sitting:
     untouched: np.ndarray
     touches: np.ndarray
     drift: float = 0.0
+    tolerance: SheetTolerance = IDEAL_SHEETS
 
     def sensor(self) -> Sensor:
         """Return what the decoder is told; leads are 1 ohm by default."""
@@ -61,7 +64,8 @@ class Sitting:
         )
         height = (plant.slant**2 - (plant.radius2 - plant.radius1) ** 2) ** 0.5
         cone = Frustum(plant.radius1, plant.radius2, height, plant.wrap)
-        return Sensor(cone, electronics=parts, upper_sheet_ohms=plant.upper, lower_sheet_ohms=plant.lower)
+        sheets = {"upper_sheet_ohms": plant.upper, "lower_sheet_ohms": plant.lower}
+        return Sensor(cone, electronics=parts, tolerance=self.tolerance, **sheets)
 
     def settings(self) -> DetectorSettings:
         """Return the settings of its detector."""
@@ -87,11 +91,13 @@ def decode(sitting: Sitting) -> dict[str, np.ndarray]:
     for number, counts in enumerate(untouched.tolist()):
         learned.feed(packet(number, counts), FRAME_PERIOD * number)
     if not learned.ready:
-        raise RuntimeError(f"the sensor is not ready after {len(untouched)} frames: {learned.detectors[0].fault}")
+        fault = learned.detectors[0].fault
+        raise RuntimeError(f"not ready after {len(untouched)} frames: {fault.name if fault else 'no reason'}")
     shape = touches.shape[:2]
     out = {name: np.full(shape, np.nan) for name in ("u", "phi", "uu", "us", "ss")}
     out |= {name: np.zeros(shape, bool) for name in ("valid", "touched")}
     out |= {"seconds": np.full(shape, np.nan), "faults": np.zeros(shape[0], bool), "notone": np.zeros(shape, bool)}
+    out["named"] = np.full(shape[0], "", object)
     clock = time.perf_counter
     gc.disable()
     for k, frames in enumerate(touches.tolist()):
@@ -103,7 +109,9 @@ def decode(sitting: Sitting) -> dict[str, np.ndarray]:
             began = clock()
             events = stream.feed(data, FRAME_PERIOD * number)
             out["seconds"][k, n] = clock() - began
-            out["faults"][k] |= any(isinstance(event, SkinFault) for event in events)
+            for event in events:
+                if isinstance(event, SkinFault):
+                    out["faults"][k], out["named"][k] = True, event.fault.name
             reading = detector.reading_now
             if reading is None:
                 continue

@@ -115,7 +115,7 @@ class Detector:
         self._leak = UntouchedLeak(sensor, 2.0 * release / (1.0 - release) / sensor.electronics.pulldown_ohms)
         self._self_test = FrameSelfTest(sensor, self._currents)
         self._inversion = FrameInversion(sensor)
-        self._places = TouchPlace(sensor, self.settings, self._currents, self._leak)
+        self._places = TouchPlace(sensor, self.settings, self._currents, self._leak, self._guides)
         self._told = ReportedTouch(sensor, self.settings)
         self._above = self._below = self._quiet = 0
         self._contradictions = 0.0  # frames taken for a change of contact, less what good frames have taken off

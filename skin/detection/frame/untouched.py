@@ -147,17 +147,39 @@ _MAX_GUIDE_GROWTH: Final = 0.1  # parts of the supply a second; the fastest grow
 _LEVEL_COUNTS: Final = 1.5  # counts; a change of the level by this explains what the guides show
 
 
+_HUM_MEMORY: Final = 1.0 / 256.0  # frames; weight of the newest in what the guides swing
+_HUM_WEIGHT: Final = 2.0 * _HUM_MEMORY  # an untouched guide stands at 0, so that half of a swing is cut off
+_HUM_RATIO: Final = 4.0  # of the variance that the currents' noise leaves on two guides; more is hum
+
+
 class UntouchedGuides:
-    """The potentials that the guides of an untouched sensor have by a leak between the layers.
+    """The potentials that the guides of an untouched sensor have by a leak between the layers, and by mains.
 
     Args:
         currents: of the untouched sensor, with the noise that was learned.
+
+    Attributes:
+        radial_hum: variance of the two guides' mean in the radial phase, over the supply squared.
+        angular_hum: likewise in the angular phase.
     """
 
     def __init__(self, currents: UntouchedCurrents) -> None:
         self._currents = currents
         self._radial = self._angular = self._level = 0.0
+        self.radial_hum = self.angular_hum = 0.0
         self._known = False
+
+    def hum(self, supply: float) -> tuple[float, float]:
+        """Return the variances of X and Y by what swings on the guides and not on the currents; 0 where none does.
+
+        Args:
+            supply: of a phase [counts].
+        """
+        least = 0.5 * _HUM_RATIO * (self._currents.noise / supply) ** 2
+        return (
+            self.radial_hum if self.radial_hum > least else 0.0,
+            self.angular_hum if self.angular_hum > least else 0.0,
+        )
 
     def contradict(self, frame: Frame, level: float, period: float) -> bool:
         """Tell whether the guides show a contact that the level does not.
@@ -183,6 +205,8 @@ class UntouchedGuides:
             return (level - self._level) * supply < _LEVEL_COUNTS and self._exceed_noise(
                 step1, step2, split1 / supply, split2 / supply, supply
             )
+        self.radial_hum += _HUM_WEIGHT * step1 * step1 - _HUM_MEMORY * self.radial_hum
+        self.angular_hum += _HUM_WEIGHT * step2 * step2 - _HUM_MEMORY * self.angular_hum
         most = _MAX_GUIDE_GROWTH * period
         self._radial += bounded(step1, most)
         self._angular += bounded(step2, most)

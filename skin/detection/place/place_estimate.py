@@ -29,6 +29,7 @@ from typing import NamedTuple
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, MatrixNoise
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sheet_functions import RobinFunction
+from coneskin.skin.tolerance import PlaceFloor
 
 __all__ = [
     "PlaceEstimate",
@@ -173,15 +174,32 @@ class PlaceEstimate(NamedTuple):
 
     u: float  #: slant distance from end 1 [m]
     phi: float  #: azimuth [rad]
-    uu: float  #: variance of u [m^2]
-    us: float  #: covariance of u and s [m^2]
-    ss: float  #: variance of s [m^2]
+    fixed: tuple[float, float, float]  #: covariances uu, us, ss [m^2] that more frames of the same place leave
+    one: tuple[float, float, float]  #: by the noise of one frame's centre
+    scale: tuple[float, float]  #: distances on the sheet for the sides of the rectangle [m]
     move_x: float  #: from the electrical centre to the place, in the rectangle [m]
     move_y: float
     dipole: _DipoleStrength
     edge: (
         float  #: what place and edges add to c of a disc: less 2 pi/Rs times the Robin function, less ln of the stretch
     )
+
+    def covariance(
+        self, share: float, motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> tuple[float, float, float]:
+        """Return the covariances uu, us, ss of a place that was worked out with this estimate [m^2].
+
+        Args:
+            share: variance of its centre over that of one frame.
+            motion: covariances of the centre by motion, as ratios of the sides squared.
+        """
+        (uu, us, ss), (one_uu, one_us, one_ss), (along, around) = self.fixed, self.one, self.scale
+        xx, xy, yy = motion
+        return (
+            uu + share * one_uu + xx * along * along,
+            us + share * one_us + xy * along * around,
+            ss + share * one_ss + yy * around * around,
+        )
 
 
 class PlaceEstimator:
@@ -210,6 +228,9 @@ class PlaceEstimator:
         )
         self.sheets = (0.0, 0.0)
         self._sum = 0.0
+        self._floor = PlaceFloor(
+            sensor.tolerance, (self.length, self.breadth), (sensor.radial_ohms, sensor.angular_ohms)
+        )
         self._robin = self._learn(
             self.breadth / (sensor.upper_sheet_ohms * self.length),
             self.length / (sensor.lower_sheet_ohms * self.breadth),
@@ -251,9 +272,8 @@ class PlaceEstimator:
         stretch = math.exp(self.curvature * x)
         robin, slope_x, slope_y = self._robin.value_and_gradient(x, y)
         taper = rs * self.curvature / (4.0 * math.pi)
-        xx = share * one.xx * squares[0]
-        xy = share * one.xy * squares[1]
-        yy = share * one.yy * squares[2]
+        one_xx, one_xy, one_yy = one.xx * squares[0], one.xy * squares[1], one.yy * squares[2]
+        noise_place = share * (one_xx + one_yy)
         # the mean of both, each weighed by its noise: for a round contact they are equal
         weight = (noise_yy - noise_both) / max(noise_xx + noise_yy - 2.0 * noise_both, 1e-60)
         weight = 0.0 if weight < 0.0 else 1.0 if weight > 1.0 else weight
@@ -263,7 +283,7 @@ class PlaceEstimator:
         unequal = 0.5 * (a_xx - a_yy)
         noise_unequal = 0.25 * (noise_xx + noise_yy - 2.0 * noise_both)
         per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
-        tolerated = (xx + yy) / (per_dipole + 1e-12 * rs * rs)
+        tolerated = noise_place / (per_dipole + 1e-12 * rs * rs)
         dipole = _weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
         edge_c = -2.0 * math.pi / rs * robin - math.log(stretch)
         prior = (_ROUND_INEQUALITY * dipole.strength) ** 2
@@ -276,7 +296,7 @@ class PlaceEstimator:
         move_x = move_y = size = 0.0
         for again in (False, True):
             if again:
-                if size * size < xx + yy:
+                if size * size < noise_place:
                     break  # it changes by less than noise does
                 slope_x, slope_y = self._robin.gradient(x, y)
             move_x = 0.5 * (a_xx * slope_x + a_xy * slope_y) + taper * (2.0 * a_xx - a_yy)
@@ -302,6 +322,7 @@ class PlaceEstimator:
         neglected = (
             area * (_NEXT_IMAGE * moved / (edge * edge) + _NEXT_TAPER * math.sqrt(area) * self.curvature**2)
         ) ** 2
+        xx, xy, yy = self._floor.at(x / length, y / breadth, move_x, move_y)
         xx += by_mean[0] ** 2 * var_mean + by_half[0] ** 2 * var_half + by_cross[0] ** 2 * var_cross
         xx += 2.0 * by_mean[0] * x_mean + neglected
         yy += by_mean[1] ** 2 * var_mean + by_half[1] ** 2 * var_half + by_cross[1] ** 2 * var_cross
@@ -311,7 +332,17 @@ class PlaceEstimator:
         stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
-        return PlaceEstimate(u, phi, squared * xx, squared * xy, squared * yy, move_x, move_y, dipole, edge_c)
+        return PlaceEstimate(
+            u,
+            phi,
+            (squared * xx, squared * xy, squared * yy),
+            (squared * one_xx, squared * one_xy, squared * one_yy),
+            (stretch * length, stretch * breadth),
+            move_x,
+            move_y,
+            dipole,
+            edge_c,
+        )
 
     def disc_dipole(self, radius: float, conductance: float, edge: float) -> float:
         """Return the dipole of one disc of a radius [m] that has a conductance [S], on the sheet [S m^2].

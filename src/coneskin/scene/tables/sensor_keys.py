@@ -109,9 +109,12 @@ _SHEET_KEYS = with_meanings(
     """
     upper_sheet_ohm: resistance of the upper conductive layer per square
     lower_sheet_ohm: resistance of the lower conductive layer per square
+    sheet_class: how uniform they are: `film` (sputtered or printed, as of touch panels), `coated` (hand-cut carbon
+        film, textile) or `ideal`. Without a calibration, the doubt of each place follows from it
     """,
     Key("upper_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
     Key("lower_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
+    Key("sheet_class", str, "film", choices=("film", "coated", "ideal")),
 )
 _THRESHOLD_KEYS = with_meanings(
     """
@@ -131,6 +134,7 @@ CALIBRATION_KEYS = with_meanings(
     """
     map_along: what a calibration takes off places along the side; `calibration` gives it
     map_around: what a calibration takes off places about the axis; `calibration` gives it
+    map_error_mm: standard deviation of a calibrated place, along and around; `calibration` gives it
     map_note: where `map_along` and `map_around` come from
     forces_n: known forces of a calibration, rising; `calibration` gives them
     force_levels: levels that the known forces gave
@@ -138,6 +142,7 @@ CALIBRATION_KEYS = with_meanings(
     """,
     Key("map_along", list, None, low=-0.1, high=0.1, length=5),
     Key("map_around", list, None, low=-0.1, high=0.1, length=5),
+    Key("map_error_mm", float, None, low=0.0, high=100.0),
     Key("map_note", str, ""),
     Key("forces_n", list, None, low=0.0, high=1000.0),
     Key("force_levels", list, None, low=0.0, high=1.0),

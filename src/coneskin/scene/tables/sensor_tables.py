@@ -6,6 +6,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -106,6 +107,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
     from coneskin.geometry.pose import Pose
     from coneskin.skin.electronics import GivenElectronics, LeadOhms, Polarity, match_electronics
     from coneskin.skin.sensor import Sensor, sheet_resistances
+    from coneskin.skin.tolerance import SHEET_CLASSES
 
     try:
         frustum = Frustum(**{key.plain: values[key.plain] for key in CONE_KEYS})
@@ -133,6 +135,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
             lower_sheet_ohms=values["lower_sheet"],
             place_map=_place_map(frustum, values),
             force_table=forces,
+            tolerance=replace(SHEET_CLASSES[values["sheet_class"]], map_error=values["map_error"]),
         )
         pose = Pose.from_xyz_rpy(values["xyz"], values["rpy"])
         return sensor, _place(frustum, pose, values["bend_wrap"], values["bend_turn"], values["bend_lift"])

@@ -257,6 +257,7 @@ def calibration_keys(place: Path, sensor: Sensor, simulated: bool) -> dict[str, 
     keys: dict[str, Any] = {
         "map_along": list(record.map_along),
         "map_around": list(record.map_around),
+        "map_error_mm": record.map_error_mm,
         "map_note": note,
     }
     if record.forces_n:

@@ -12,6 +12,7 @@ from coneskin.skin.electronics import Electronics
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import IDEAL_SHEETS
 from coneskin.skin.virtual.circuit import measure
 from coneskin.skin.wire import Frame
 
@@ -26,7 +27,7 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
     """Square of the error [m^2], in deviations, as the covariance says, and uncorrected; place by place."""
     cone, rng = SHAPES[shape], random.Random(f"{shape} {bits} {radius} {ka}")
     parts = Electronics(adc_bits=bits, current_full_scale={"forearm": 0.0058, "paper": 0.0125}[shape])
-    sensor = Sensor(cone, upper_sheet_ohms=OHMS, lower_sheet_ohms=OHMS, electronics=parts)
+    sensor = Sensor(cone, upper_sheet_ohms=OHMS, lower_sheet_ohms=OHMS, electronics=parts, tolerance=IDEAL_SHEETS)
     sheet = SectorSheet.of_frustum(cone)
     model = FieldModel(sheet, OHMS, OHMS, 1e-7)
     inversion, noise, estimator = FrameInversion(sensor), FrameNoise(sensor), PlaceEstimator(sensor)
@@ -53,11 +54,11 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
         )
         place = estimator.estimate(matrix, one, 1.0, learned)
         du, ds = place.u - u, cone.radius_at(u) * (place.phi - phi)
-        determinant = place.uu * place.ss - place.us**2
-        square = (place.ss * du * du - 2.0 * place.us * du * ds + place.uu * ds * ds) / determinant
+        uu, us, ss = place.covariance(1.0)
+        square = (ss * du * du - 2.0 * us * du * ds + uu * ds * ds) / (uu * ss - us**2)
         raw_u, raw_phi = estimator.place(matrix.x, matrix.y, 0.0, 0.0)
         raw = math.hypot(raw_u - u, cone.radius_at(u) * (raw_phi - phi))
-        found.append((du * du + ds * ds, square, place.uu + place.ss, raw * raw))
+        found.append((du * du + ds * ds, square, uu + ss, raw * raw))
     return found
 
 

@@ -12,19 +12,20 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import TouchBegan, TouchMoved
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedLeak
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
 from coneskin.skin.detection.place.single_contact import SingleContactTest
 from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sheet_functions import RobinFunction
+from coneskin.skin.tolerance import IDEAL_SHEETS
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.wire import Frame
 
 from ...bench_top import UR10, measured
 
-SENSOR = Sensor(UR10, name="forearm")
+SENSOR = Sensor(UR10, name="forearm", tolerance=IDEAL_SHEETS)
 COUNTS = Frame._fields[6:-1]
 LEARNED = 200  # frames
 OFTEN = 8  # frames; an estimate serves for as many
@@ -151,9 +152,12 @@ def test_a_rest_sharpens_the_place_with_few_estimates(monkeypatch):
 def test_a_centre_far_off_the_sheet_has_a_finite_velocity():
     """Counts beyond the converter's range put the electrical centre thousands of sheets away."""
     sensor = Sensor(Frustum(0.012, 0.08, 0.2), electronics=Electronics(), polarity=Polarity("A", "D"))
-    places = TouchPlace(sensor, DetectorSettings(), UntouchedCurrents(sensor, 0.0), UntouchedLeak(sensor, 1e-3))
+    currents = UntouchedCurrents(sensor, 0.0)
+    learned = currents, UntouchedLeak(sensor, 1e-3), UntouchedGuides(currents)
+    places = TouchPlace(sensor, DetectorSettings(), *learned)
     good = measured(sensor, [LayerContact(0.1, 1.0, 1e-3)])
     far = dict(zip(COUNTS, (48634, 64561, 1089, 33060, 10132, 7643, 53009, 53330, 48986), strict=False))
     for number, frame in enumerate((good, good, good._replace(**far))):
         place = places.feed(frame, read(sensor, frame), 0.9, 1e-3 * number, 1e-3)
-    assert 0.0 < math.hypot(*place.velocity) < math.inf
+    assert math.hypot(*place.velocity) < math.inf
+    assert 0.0 <= place.u <= sensor.frustum.slant

@@ -1,0 +1,204 @@
+"""Skins as they are built, effect by effect: how far places are off, whether their ellipse holds them, what is named.
+
+    python -m bench as-built                   # twenty minutes
+    python -m bench as-built --skins 4 --rows "slope 5 %"
+
+Each row draws skins whose flaws have the size of the row as their standard deviation; the decoder is told that size, or
+"film" where it has no such number. Sheets: `skin/virtual/built_sheets`. The circuit is a nodal analysis of its own, and
+the frames go as bytes into a stream. Four contacts a skin, 40 frames each, from the third on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bench.decode.cells import electronics
+from bench.decode.plants import SHEETS
+from bench.decode.runs import FRAME_PERIOD, LEARNED_FRAMES, Sitting, decode
+from bench.report import head, quantile, show
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, IDEAL_SHEETS, SheetTolerance
+from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, draw_flaws
+from coneskin.skin.virtual.circuit import LayerContact
+from coneskin.skin.virtual.field_contacts import FieldContacts
+from tests.support.field.converter_plant import ConverterPlant, leak_admittance
+
+NAME, ELECTRIC = "UR5e", "12 bit, matched"
+PLACE_COUNT = 4
+FRAME_COUNT = 40
+FIRST_FRAME = 2  # from which on a place is judged
+ELLIPSE_CHI2 = 5.991
+GUIDES = (0, 1, 3, 4, 6, 7)  # of the ten counts
+CURRENTS = (2, 5, 8)
+Frames = np.ndarray
+
+
+@dataclass(frozen=True)
+class Row:
+    """One effect.
+
+    Attributes:
+        name: of it.
+        told: what the decoder is told.
+        sheets: tolerance from which the sheets are drawn.
+        leads: standard deviation of each lead [ohm].
+        peeled: part of one electrode.
+        speed: at which the contact slides [m/s].
+        warmed: standard deviation by which the upper and the lower sheet change after learning, a ratio.
+        damp: conductance between the layers after learning [S].
+        change: of the exact counts, shape (..., frames, 10); told a random source.
+    """
+
+    name: str
+    told: SheetTolerance = IDEAL_SHEETS
+    sheets: SheetTolerance = IDEAL_SHEETS
+    leads: float = 0.0
+    peeled: float = 0.0
+    speed: float = 0.0
+    warmed: tuple[float, float] = (0.0, 0.0)
+    damp: float = 0.0
+    change: Callable[[Frames, random.Random, ConverterPlant], Frames] | None = None
+
+
+def _mains(volts: float) -> Callable[[Frames, random.Random, ConverterPlant], Frames]:
+    def add(exact: Frames, rng: random.Random, circuit: ConverterPlant) -> Frames:
+        turn = 2.0 * math.pi * (50.0 * FRAME_PERIOD * np.arange(exact.shape[-2]) + rng.random())
+        exact[..., GUIDES] += volts / circuit.adc * (2**circuit.bits - 1) * np.sin(turn)[:, None]
+        return exact
+
+    return add
+
+
+def _gain(part: float) -> Callable[[Frames, random.Random, ConverterPlant], Frames]:
+    def scale(exact: Frames, rng: random.Random, _: ConverterPlant) -> Frames:
+        exact[..., CURRENTS] *= 1.0 + part * rng.choice((-1.0, 1.0))
+        return exact
+
+    return scale
+
+
+def _converter(offset: float, bend: float) -> Callable[[Frames, random.Random, ConverterPlant], Frames]:
+    def bent(exact: Frames, rng: random.Random, circuit: ConverterPlant) -> Frames:
+        turn = 2.0 * math.pi * exact / (2**circuit.bits - 1)
+        return np.asarray(exact + rng.choice((-1.0, 1.0)) * (offset + bend * np.sin(turn)))
+
+    return bent
+
+
+def _one(**values: float) -> dict[str, SheetTolerance]:
+    return {"told": SheetTolerance(**values), "sheets": SheetTolerance(**values)}
+
+
+ROWS = (
+    Row("ideal, at rest"),
+    *(Row(f"ideal, slides at {speed:g} m/s", speed=speed) for speed in (0.05, 0.2, 0.5, 1.0)),
+    *(Row(f"slope {100 * value:g} %", **_one(slope=value)) for value in (0.05, 0.2)),
+    *(Row(f"skew {100 * value:g} %", **_one(skew=value)) for value in (0.02, 0.05)),
+    Row("patches 5 %", **_one(patches=0.05)),
+    *(Row(f"silver line {value:g} ohm", **_one(line=value)) for value in (2.0, 10.0, 50.0)),
+    Row("leads 5 ohm", told=SheetTolerance(lead=5.0), leads=5.0),
+    Row("20 % of an electrode peeled", told=FILM_SHEETS, peeled=0.2),
+    *(
+        Row(f"both sheets {100 * v:g} % after learning", told=SheetTolerance(drift=v), warmed=(v, v))
+        for v in (0.005, 0.02)
+    ),
+    Row("one sheet 1 % after learning", told=FILM_SHEETS, warmed=(0.01, 0.0)),
+    Row("damp, 20 uS after learning", told=FILM_SHEETS, damp=2e-5),
+    Row("20 mV of mains on the guides", told=IDEAL_SHEETS, change=_mains(0.02)),
+    Row("current gain 2 %", told=FILM_SHEETS, change=_gain(0.02)),
+    Row("current gain 10 %", told=FILM_SHEETS, change=_gain(0.10)),
+    Row("offset 4 LSB", told=SheetTolerance(reading=1e-3), change=_converter(4.0, 0.0)),
+    Row("linearity 4 LSB", told=SheetTolerance(reading=1e-3), change=_converter(0.0, 4.0)),
+    *(
+        Row(f"{name}, all of it", told=of, sheets=of, leads=of.lead, warmed=(of.drift, of.drift))
+        for name, of in (("film", FILM_SHEETS), ("coated", COATED_SHEETS))
+    ),
+)
+
+
+def measure(row: Row, skins: int) -> list[str]:
+    """Return the cells of one row."""
+    plant, base = SHEETS[NAME], electronics(NAME)[ELECTRIC]
+    exact_field = FieldContacts()
+    errors, inside, certain, names = [], [], [], Counter[str]()
+    for seed in range(skins):
+        rng = random.Random(f"{row.name} {seed}")
+        noise = np.random.default_rng(seed)
+        circuit = replace(base, leads=tuple(1.0 + abs(rng.gauss(0.0, row.leads)) for _ in range(4)))
+        flaws = draw_flaws(row.sheets, seed)
+        if row.peeled:
+            flaws = replace(flaws[0], peeled=row.peeled), flaws[1]
+        ideal = flaws == (SheetFlaws(seed=flaws[0].seed), SheetFlaws(seed=flaws[1].seed))
+        sitting = Sitting(plant, circuit, np.zeros((0, 10)), np.zeros((0, 0, 10)), tolerance=row.told)
+        sensor = sitting.sensor()
+        sheets = exact_field if ideal else BuiltSheets(flaws, exact_field)
+        places = [_places(sensor, rng, row.speed) for _ in range(PLACE_COUNT)]
+        still = np.array(sheets.admittances(sensor, [[]])[0])
+        change = row.change or (lambda exact, *_: exact)
+        quiet = change(np.repeat(circuit.exact(still)[None], LEARNED_FRAMES, 0), random.Random(seed), circuit)
+        sitting.untouched = circuit.counts(quiet, 1, noise)[:, 0]
+        touches = np.array([_touch(sheets, sensor, way, rng, row, still) for way in places])
+        frames = change(circuit.exact(touches), random.Random(seed), circuit)
+        sitting.touches = circuit.counts(frames, 1, noise)[:, :, 0]
+        try:
+            said = decode(sitting)
+        except RuntimeError as error:
+            names[str(error)] += PLACE_COUNT
+            certain += [False] * PLACE_COUNT
+            continue
+        names.update(name for name in said["named"] if name)
+        for k, way in enumerate(places):
+            du = said["u"][k] - way[:, 0]
+            ds = sensor.frustum.radius1 * (said["phi"][k] - way[:, 1])
+            uu, us, ss = said["uu"][k], said["us"][k], said["ss"][k]
+            square = (ss * du**2 - 2.0 * us * du * ds + uu * ds**2) / (uu * ss - us * us)
+            known = np.isfinite(square) & (np.arange(FRAME_COUNT) >= FIRST_FRAME)
+            inside += (square[known] < ELLIPSE_CHI2).tolist()
+            valid = said["valid"][k]
+            certain.append(bool(valid.any()))
+            errors += (1e3 * np.hypot(du, ds)[valid]).tolist()
+    off = f"{quantile(errors, 0.5):.2f} / {quantile(errors, 0.95):.2f}"
+    held = f"{np.mean(inside):.3f}" if inside else "-"
+    most = ", ".join(f"{name} {count}" for name, count in names.most_common(2))
+    return [row.name, off, held, f"{np.mean(certain):.2f}", str(len(certain)), most or "-"]
+
+
+def _places(sensor: Sensor, rng: random.Random, speed: float) -> np.ndarray:
+    """Return u [m] and phi [rad] of a contact frame after frame."""
+    cone = sensor.frustum
+    turn, way = rng.uniform(0.0, 2.0 * math.pi), speed * FRAME_PERIOD * np.arange(FRAME_COUNT)
+    room, edge = 0.012 + 0.5 * way[-1] * abs(math.cos(turn)), 0.012 + 0.5 * way[-1] * abs(math.sin(turn))
+    u = rng.uniform(room, cone.slant - room) + (way - 0.5 * way[-1]) * math.cos(turn)
+    s = rng.uniform(edge, cone.wrap * cone.radius1 - edge) + (way - 0.5 * way[-1]) * math.sin(turn)
+    return np.stack([u, s / cone.radius1], axis=1)
+
+
+def _touch(
+    sheets: BuiltSheets | FieldContacts, sensor: Sensor, way: np.ndarray, rng: random.Random, row: Row, still: Frames
+) -> np.ndarray:
+    """Return Y frame by frame [S]."""
+    radius, siemens = rng.uniform(0.003, 0.008), math.exp(rng.uniform(math.log(7e-4), math.log(3e-3)))
+    contacts = [[LayerContact(u, phi, siemens, radius, radius)] for u, phi in way.tolist()]
+    found = sheets.admittances(sensor, contacts if row.speed else contacts[:1])
+    y = np.array(found if row.speed else found * FRAME_COUNT)
+    warmed = [rng.gauss(0.0, row.warmed[0])] * 2 + [rng.gauss(0.0, row.warmed[1])] * 2
+    return np.asarray(y - still * np.array(warmed) + leak_admittance(row.damp))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--skins", type=int, default=24, help="of each row (%(default)s)")
+    parser.add_argument("--rows", default="", help="only those whose name begins so")
+    args = parser.parse_args()
+    print(head("numpy", "scipy"))
+    rows = [measure(row, args.skins) for row in ROWS if row.name.startswith(args.rows)]
+    columns = ["effect", "certain places off, median / 95 % [mm]", "in the ellipse", "certain", "touches", "named"]
+    show(f"skins as they are built, {NAME}, {ELECTRIC}", columns, rows)

@@ -1,0 +1,149 @@
+"""Filter of the contact matrices of one touch after another: it rests, or moves at a constant velocity.
+
+In information form: sums of the frames, of their times and of their electrical centres, the newest frame at time 0.
+They fit a line to the centre. How far the line is believed is the chance that the touch moves and does not rest, by the
+frames themselves (a Bayes factor, with a normal prior of the velocity). So at rest the noise of the place falls with
+the root of the number of frames, and a sliding touch is not behind itself. A frame that neither explains begins anew.
+
+The covariance is that of the mixture: noise, what is not known of the velocity, and the way within one frame, whose
+phases are measured one after the other.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, MatrixNoise
+
+__all__ = ["TouchFilter"]
+
+_MEMORY_FRAMES: Final = 128.0  # frames that the sums stand for at most
+_SMOOTHING_GAIN: Final = 0.125  # of the distance to the prediction; its variance is 1/15 of a frame's
+_SMOOTHED_VARIANCE: Final = _SMOOTHING_GAIN / (2.0 - _SMOOTHING_GAIN)
+_MOVED_VARIANCE: Final = 16.0  # four standard deviations, squared: once in 16 000 independent frames by chance
+_JUMPED_VARIANCE: Final = 36.0  # six, of one frame alone
+_USUAL_SPEED: Final = 0.3  # m/s; standard deviation of the velocity of a touch that moves
+_TOLD_CHANCE: Final = 0.999  # chance that it moves, from which on a velocity is told
+_PHASE_SKEW: Final = 1.0 / 6.0  # of a frame; standard deviation of the moment at which its place was
+
+
+class TouchFilter:
+    """The filter of one sensor.
+
+    Args:
+        length: of the sheet's rectangle along and around, at the wider end [m].
+
+    Attributes:
+        frames: that the averages stand for, 1 where it has just begun anew, 0 before the first.
+        values: the first six of a ``ContactMatrix``: the centre where it is now, the others averaged.
+        share: variance of the centre over that of one frame, by noise.
+        motion: covariances xx, xy, yy of the centre by motion, as ratios of the sides squared.
+        velocity: of the centre [sides per frame]; 0 where it may rest.
+    """
+
+    def __init__(self, length: tuple[float, float]) -> None:
+        self._length = length
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all matrices."""
+        self.frames = 0
+        self.values = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self.share = self._ahead = 1.0
+        self.motion = self.velocity = (0.0, 0.0, 0.0)
+        self._s0 = self._s1 = self._s2 = 0.0
+        self._x0 = self._x1 = self._y0 = self._y1 = 0.0
+        self._smooth_x = self._smooth_y = self._ahead_x = self._ahead_y = 0.0
+        self._first_x = self._first_y = 0.0
+
+    def begin(self, matrix: ContactMatrix) -> None:
+        """Begin with a matrix."""
+        self.frames, self.values = 1, matrix[:6]
+        self._s0, self._s1, self._s2 = 1.0, 0.0, 0.0
+        self._x0 = self._x1 = self._y0 = self._y1 = 0.0
+        self._smooth_x = self._smooth_y = self._ahead_x = self._ahead_y = 0.0
+        self._first_x, self._first_y = matrix.x, matrix.y
+        self.share = self._ahead = 1.0
+        self.motion = self.velocity = (0.0, 0.0, 0.0)
+
+    def feed(self, matrix: ContactMatrix, noise: MatrixNoise, period: float) -> None:
+        """Take the matrix of the next frame.
+
+        Args:
+            matrix: of the frame.
+            noise: of one frame.
+            period: time from frame to frame [s].
+        """
+        if not self.frames:
+            self.begin(matrix)
+            return
+        new_g, new_x, new_y, new_along, new_cross, new_around = matrix[:6]
+        g, x, y, along, cross, around = self.values
+        usual = _USUAL_SPEED * period
+        usual_x, usual_y = (usual / self._length[0]) ** 2, (usual / self._length[1]) ** 2
+        xx, yy = noise.xx, noise.yy
+        moving_x, moving_y = self.motion[0], self.motion[2]
+        if self.frames == 1:
+            moving_x, moving_y = usual_x, usual_y
+        off_x, off_y = new_x - x - self._ahead_x, new_y - y - self._ahead_y
+        self._smooth_x = smooth_x = self._smooth_x + _SMOOTHING_GAIN * (off_x - self._smooth_x)
+        self._smooth_y = smooth_y = self._smooth_y + _SMOOTHING_GAIN * (off_y - self._smooth_y)
+        alone, smooth = 1.0 + self._ahead, _SMOOTHED_VARIANCE + self._ahead
+        if (
+            off_x * off_x > _JUMPED_VARIANCE * (alone * xx + moving_x)
+            or off_y * off_y > _JUMPED_VARIANCE * (alone * yy + moving_y)
+            or smooth_x * smooth_x > _MOVED_VARIANCE * (smooth * xx + moving_x)
+            or smooth_y * smooth_y > _MOVED_VARIANCE * (smooth * yy + moving_y)
+        ):
+            self.begin(matrix)
+            return
+        self._add(new_x - self._first_x, new_y - self._first_y)
+        place_x, place_y = self._fit(xx, yy, usual_x, usual_y)
+        frames = self.frames
+        if frames < _MEMORY_FRAMES:
+            self.frames = frames = frames + 1
+        gain = 1.0 / frames
+        self.values = (
+            g + gain * (new_g - g),
+            place_x,
+            place_y,
+            along + gain * (new_along - along),
+            cross + gain * (new_cross - cross),
+            around + gain * (new_around - around),
+        )
+
+    def _add(self, x: float, y: float) -> None:
+        """Add a centre, as far as it is from the first, at time 0. All others become one frame older."""
+        kept = 1.0 if self._s0 < _MEMORY_FRAMES - 1.0 else 1.0 - 1.0 / _MEMORY_FRAMES
+        s0, s1 = self._s0, self._s1
+        self._s2 = kept * (self._s2 - 2.0 * s1 + s0)
+        self._s1 = kept * (s1 - s0)
+        self._s0 = kept * s0 + 1.0
+        self._x1, self._y1 = kept * (self._x1 - self._x0), kept * (self._y1 - self._y0)
+        self._x0, self._y0 = kept * self._x0 + x, kept * self._y0 + y
+
+    def _fit(self, xx: float, yy: float, usual_x: float, usual_y: float) -> tuple[float, float]:
+        """Return the centre now, and note its covariance and velocity.
+
+        Args:
+            xx, yy: noise of one frame's centre.
+            usual_x, usual_y: variances of the velocity of what moves [sides per frame].
+        """
+        share = 1.0 / self._s0
+        lag = -self._s1 * share  # frames from the mean time of them all
+        spread = self._s2 + self._s1 * lag
+        by_noise = 1.0 / spread  # variance of the velocity, over that of one frame
+        mean_x, mean_y = self._x0 * share, self._y0 * share
+        step_x, step_y = (self._x1 + lag * self._x0) * by_noise, (self._y1 + lag * self._y0) * by_noise
+        doubt_x, doubt_y = xx * by_noise, yy * by_noise
+        odds = (1.0 + usual_x / doubt_x) * (1.0 + usual_y / doubt_y)
+        seen = step_x * step_x / doubt_x + step_y * step_y / doubt_y
+        moves = 1.0 if seen > 200.0 else 1.0 / (1.0 + math.sqrt(odds) * math.exp(-0.5 * seen))
+        self._ahead_x, self._ahead_y = moves * step_x, moves * step_y
+        self.share = share + moves * lag * lag * by_noise
+        self._ahead = share + moves * (lag + 1.0) * (lag + 1.0) * by_noise
+        unsure = moves * (1.0 - moves) * lag * lag + moves * _PHASE_SKEW * _PHASE_SKEW
+        self.motion = unsure * step_x * step_x, unsure * step_x * step_y, unsure * step_y * step_y
+        self.velocity = (step_x, step_y, 0.0) if moves > _TOLD_CHANCE else (0.0, 0.0, 0.0)
+        return self._first_x + mean_x + moves * lag * step_x, self._first_y + mean_y + moves * lag * step_y
