@@ -1,11 +1,11 @@
 """Calibration of one sensor: the place map that takes off what places read wrongly, and the table of known forces.
 
 A place is two fractions: x of the potential between the electrodes of the upper sheet, counted from end 1 (eq. 19), and
-y of the wrap. Leads and joints that nobody knows, and electrodes off their drawing, give each an offset and a gain;
-sheets that are not uniform bend them smoothly. So with c = x - 1/2 and d = y - 1/2
+y of the wrap. Leads and joints that nobody knows, and electrodes off their drawing, give each an offset and a gain, a
+sheet that lies askew a shear; sheets that are not uniform bend them smoothly. So with c = x - 1/2 and d = y - 1/2
 
-    x' = x + a0 + a1 c + a2 c d + a3 (c^2 - 1/12) + a4 (d^2 - 1/12)
-    y' = y + b0 + b1 d + b2 c d + b3 (c^2 - 1/12) + b4 (d^2 - 1/12)
+    x' = x + a0 + a1 c + a2 d + a3 c d + a4 (c^2 - 1/12) + a5 (d^2 - 1/12)
+    y' = y + b0 + b1 d + b2 c + b3 c d + b4 (c^2 - 1/12) + b5 (d^2 - 1/12)
 
 The limits of the numbers keep the symmetric part of the Jacobian positive definite on the whole sheet, so the map is
 one to one there. Its terms are orthogonal over the sheet.
@@ -30,10 +30,10 @@ from .sheet_functions import LogScale
 __all__ = ["MAP_LIMITS", "ForceTable", "PlaceMap", "map_terms"]
 
 #: largest magnitude of each number of a fraction; an offset or a gain beyond it is another sheet, or another wiring
-MAP_LIMITS = (0.05, 0.05, 0.1, 0.1, 0.1)
+MAP_LIMITS = (0.05, 0.05, 0.05, 0.15, 0.15, 0.15)
 _SQUARE_MEAN = 1.0 / 12.0
 _FULL_TURN = 2.0 * math.pi  # rad
-_MAX_ITERATIONS = 60  # of the inverse; each leaves at most a third of the error
+_MAX_ITERATIONS = 60  # of the inverse; each leaves at most half of the error
 _INVERSE_TOLERANCE = 1e-15
 _log1p, _expm1 = math.log1p, math.expm1
 
@@ -42,7 +42,7 @@ def map_terms(x: float, y: float) -> tuple[tuple[float, ...], tuple[float, ...]]
     """Return the terms that the numbers of a map belong to at the fractions x and y: those of x', then those of y'."""
     c, d = x - 0.5, y - 0.5
     bends = c * d, c * c - _SQUARE_MEAN, d * d - _SQUARE_MEAN
-    return (1.0, c, *bends), (1.0, d, *bends)
+    return (1.0, c, d, *bends), (1.0, d, c, *bends)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,17 +51,18 @@ class PlaceMap:
 
     Attributes:
         frustum: of the sensor.
-        along: a0 to a4: offset, gain (around the middle, beyond 1), and three terms that bend, of the fraction along.
-        around: b0 to b4, of the fraction around: offset, gain, and the same three terms.
+        along: a0 to a5: offset, gain (around the middle, beyond 1), shear, and three terms that bend, of the fraction
+            along.
+        around: b0 to b5, of the fraction around: the same.
         note: where it comes from, for people.
 
     Raises:
-        SensorError: there are not 5 numbers, one is beyond its limit in ``MAP_LIMITS``, or an end is an apex.
+        SensorError: there are not 6 numbers, one is beyond its limit in ``MAP_LIMITS``, or an end is an apex.
     """
 
     frustum: Frustum
-    along: tuple[float, ...] = (0.0,) * 5
-    around: tuple[float, ...] = (0.0,) * 5
+    along: tuple[float, ...] = (0.0,) * 6
+    around: tuple[float, ...] = (0.0,) * 6
     note: str = field(default="", compare=False)
     _scale: LogScale = field(init=False, repr=False, compare=False)
     _live: tuple[float, ...] = field(init=False, repr=False, compare=False)  # what ``apply`` needs, to be had at once
@@ -78,12 +79,12 @@ class PlaceMap:
                     f"place_map.{name} must be {len(MAP_LIMITS)} numbers of at most {', '.join(map(str, MAP_LIMITS))} "
                     f"in magnitude, or it is no correction of this sensor any more; got {values!r}"
                 )
-        (a0, a1, a2, a3, a4), (b0, b1, b2, b3, b4) = self.along, self.around
+        (a0, *a), (b0, *b) = self.along, self.around
         growth = (cone.radius2 - cone.radius1) / (cone.radius1 * cone.slant)
         log_ratio = math.log1p(growth * cone.slant)
-        live = (growth, log_ratio, cone.slant, cone.wrap, a0 - _SQUARE_MEAN * (a3 + a4), a1, a2, a3, a4)
+        live = (growth, log_ratio, cone.slant, cone.wrap, a0 - _SQUARE_MEAN * (a[3] + a[4]), *a)
         object.__setattr__(self, "_scale", LogScale(cone.radius1, cone.radius2, cone.slant))
-        object.__setattr__(self, "_live", (*live, b0 - _SQUARE_MEAN * (b3 + b4), b1, b2, b3, b4))
+        object.__setattr__(self, "_live", (*live, b0 - _SQUARE_MEAN * (b[3] + b[4]), *b))
 
     def apply(self, u: float, phi: float) -> tuple[float, float]:
         """Return where a touch is that is read at a place.
@@ -95,11 +96,11 @@ class PlaceMap:
         Returns:
             u [m] and phi [rad], on the sheet: held at its ends and edges, or taken round where the wrap is a full turn.
         """
-        growth, log_ratio, slant, wrap, a0, a1, a2, a3, a4, b0, b1, b2, b3, b4 = self._live
+        growth, log_ratio, slant, wrap, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5 = self._live
         c = (_log1p(growth * u) / log_ratio if growth else u / slant) - 0.5
         d = phi / wrap - 0.5
-        step = a0 + a1 * c + d * (a2 * c + a4 * d) + a3 * c * c
-        phi += wrap * (b0 + b1 * d + c * (b2 * d + b3 * c) + b4 * d * d)
+        step = a0 + a1 * c + d * (a2 + a3 * c + a5 * d) + a4 * c * c
+        phi += wrap * (b0 + b1 * d + c * (b2 + b3 * d + b4 * c) + b5 * d * d)
         u += (1.0 + growth * u) / growth * _expm1(step * log_ratio) if growth else step * slant
         if not 0.0 <= u <= slant:
             u = 0.0 if u < 0.0 else slant
@@ -115,13 +116,13 @@ class PlaceMap:
         wrap, scale = self.frustum.wrap, self._scale
         x, y = scale.fraction(u), phi / wrap
         c, d = x - 0.5, y - 0.5
-        (a0, a1, a2, a3, a4), (_, b1, b2, b3, b4) = self.along, self.around
-        moved = x + a0 + a1 * c + a2 * c * d + a3 * (c * c - _SQUARE_MEAN) + a4 * (d * d - _SQUARE_MEAN)
+        (a0, a1, a2, a3, a4, a5), (_, b1, b2, b3, b4, b5) = self.along, self.around
+        moved = x + a0 + a1 * c + a2 * d + a3 * c * d + a4 * (c * c - _SQUARE_MEAN) + a5 * (d * d - _SQUARE_MEAN)
         before = scale.slope(u)
         after = scale.slope(scale.distance(moved))
         return (
-            ((1.0 + a1 + a2 * d + 2.0 * a3 * c) * before / after, (a2 * c + 2.0 * a4 * d) / (wrap * after)),
-            ((b2 * d + 2.0 * b3 * c) * wrap * before, 1.0 + b1 + b2 * c + 2.0 * b4 * d),
+            ((1.0 + a1 + a3 * d + 2.0 * a4 * c) * before / after, (a2 + a3 * c + 2.0 * a5 * d) / (wrap * after)),
+            ((b2 + b3 * d + 2.0 * b4 * c) * wrap * before, 1.0 + b1 + b3 * c + 2.0 * b5 * d),
         )
 
     def invert(self, u: float, phi: float) -> tuple[float, float]:
@@ -137,7 +138,7 @@ class PlaceMap:
         wrap, scale = self.frustum.wrap, self._scale
         x0, y0 = scale.fraction(u), phi / wrap
         x, y = x0, y0
-        for _ in range(_MAX_ITERATIONS):  # a contraction: rows of the correction's derivatives sum to at most 0.35
+        for _ in range(_MAX_ITERATIONS):  # a contraction: rows of the correction's derivatives sum to at most 0.55
             for_x, for_y = map_terms(x, y)
             new_x = x0 - sum(a * term for a, term in zip(self.along, for_x, strict=True))
             new_y = y0 - sum(b * term for b, term in zip(self.around, for_y, strict=True))

@@ -32,7 +32,7 @@ PLAIN = forearm_scene(reaction='kind = "retreat"').replace(
     "[[link.sensor]]", '[[link.sensor]]\nname = "skin"\ndevice = 7'
 )
 NAMED = PLAIN.replace("device = 7", 'device = 7\ncalibration = "calibrations"')
-ALONG, AROUND = (0.001, 0.0123456789012345, 0.0, 0.0, 0.0), (0.0, -0.02, 0.01, 0.0, 0.0)
+ALONG, AROUND = (0.001, 0.0123456789012345, 0.0, 0.0, 0.0, 0.0), (0.0, -0.02, 0.0, 0.01, 0.0, 0.0)
 
 
 def a_record(text: str = PLAIN, **changes: Any) -> CalibrationRecord:
@@ -54,9 +54,9 @@ def saved(folder: Path, text: str = NAMED) -> Path:
 
 def test_a_scene_takes_the_newest_calibration_of_its_device(tmp_path: Path) -> None:
     file = tmp_path / "calibrations" / "device-7.json"
-    add_calibration(file, 7, a_record(map_along=(0.04, 0.0, 0.0, 0.0, 0.0)))
+    add_calibration(file, 7, a_record(map_along=(0.04, 0.0, 0.0, 0.0, 0.0, 0.0)))
     add_calibration(file, 7, a_record())
-    add_calibration(file, 7, a_record(sensor=1, map_along=(0.03, 0.0, 0.0, 0.0, 0.0)))
+    add_calibration(file, 7, a_record(sensor=1, map_along=(0.03, 0.0, 0.0, 0.0, 0.0, 0.0)))
     assert [item.map_along[0] for item in _read_calibrations(file, 7)] == [0.04, 0.001, 0.03]
     scene = load_scene(saved(tmp_path))
     found = scene.sensors[0].sensor.place_map
@@ -96,7 +96,7 @@ def test_a_recording_carries_the_numbers_and_names_no_file(tmp_path: Path) -> No
         ({"simulated": False}, NAMED.replace("[source]", "[[source]]"), "no calibration of the virtual sensor 0"),
         ({"sensor": 3}, NAMED, "no calibration of the virtual sensor 0"),
         ({}, NAMED.replace("device = 7", "device = 8"), "there is no calibration"),
-        ({"map_along": (0.06, 0.0, 0.0, 0.0, 0.0)}, NAMED, "place_map.along must be 5 numbers of at most 0.05"),
+        ({"map_along": (0.06, 0.0, 0.0, 0.0, 0.0, 0.0)}, NAMED, "place_map.along must be 6 numbers of at most 0.05"),
         ({}, NAMED.replace("device = 7", "device = 7\nmap_note = 'mine'"), "map_note cannot stand beside calibration"),
     ],
 )
@@ -139,7 +139,7 @@ def test_a_damaged_file_is_refused_and_never_written_over(content: bytes, tmp_pa
         ("force_error", "0.1", "something else where a number should be"),
         ("force_error", True, "something else where a number should be"),
         ("force_error", -0.1, "a number that cannot be"),
-        ("map_along", [float("nan")] * 5, "a number that cannot be"),
+        ("map_along", [float("nan")] * 6, "a number that cannot be"),
         ("map_error_mm", None, "something else where a number should be"),
         ("sensor", "0", "sensor = '0', no int"),
         ("simulated", 1, "simulated = 1, no bool"),
@@ -179,7 +179,7 @@ def test_a_new_calibration_makes_a_commissioning_void(tmp_path: Path) -> None:
     known = with_commissioning(load_scene(saved(tmp_path)), 1795341600.0).commissioning
     assert known is not None
     assert known.valid
-    add_calibration(file, 7, a_record(map_along=(0.002, 0.0, 0.0, 0.0, 0.0)))
+    add_calibration(file, 7, a_record(map_along=(0.002, 0.0, 0.0, 0.0, 0.0, 0.0)))
     known = with_commissioning(load_scene(saved(tmp_path)), 1795341600.0).commissioning
     assert known is not None
     assert not known.valid

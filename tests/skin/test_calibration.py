@@ -70,14 +70,14 @@ def test_no_place_leaves_the_sheet_and_the_limits_keep_it_one_to_one(cone, along
 
 
 def test_a_full_turn_is_closed_and_any_other_wrap_ends():
-    shifted = (0.01, 0.0, 0.0, 0.0, 0.0)
+    shifted = (0.01, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert PlaceMap(CYLINDER, around=shifted).apply(0.1, 0.999 * math.tau)[1] == pytest.approx(0.009 * math.tau)
     open_sheet = replace(CYLINDER, wrap=6.0)
     assert PlaceMap(open_sheet, around=shifted).apply(0.1, 0.999 * 6.0)[1] == 6.0
 
 
 def test_near_a_cylinder_it_is_that_of_the_cylinder():
-    along, around = (0.01, -0.02, 0.03, 0.04, -0.05), (-0.01, 0.02, -0.03, 0.04, 0.05)
+    along, around = (0.01, -0.02, 0.02, 0.03, 0.04, -0.05), (-0.01, 0.02, 0.01, -0.03, 0.04, 0.05)
     for place in ((0.03, 0.5), (0.2, 5.0)):
         of_cylinder = PlaceMap(CYLINDER, along, around).apply(*place)
         assert PlaceMap(NEARLY, along, around).apply(*place) == pytest.approx(of_cylinder, rel=1e-12)
@@ -86,9 +86,9 @@ def test_near_a_cylinder_it_is_that_of_the_cylinder():
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"along": (0.0, 0.051, 0.0, 0.0, 0.0)}, "place_map.along must be 5 numbers of at most 0.05, 0.05, 0.1"),
-        ({"around": (0.0, 0.0, math.nan, 0.0, 0.0)}, "place_map.around must be 5 numbers"),
-        ({"around": (0.0,) * 4}, "place_map.around must be 5 numbers"),
+        ({"along": (0.0, 0.051, 0.0, 0.0, 0.0, 0.0)}, "place_map.along must be 6 numbers of at most 0.05, 0.05, 0.05"),
+        ({"around": (0.0, 0.0, math.nan, 0.0, 0.0, 0.0)}, "place_map.around must be 6 numbers"),
+        ({"around": (0.0,) * 5}, "place_map.around must be 6 numbers"),
     ],
 )
 def test_what_is_no_correction_is_refused(keys, words):
@@ -113,7 +113,7 @@ def test_excess_leads_are_taken_off_by_offset_and_gain_alone(cone):
     far = 1.0 - plain.fractions(contact.u, contact.phi)[0]  # B is positive: the fraction from end 1 is the rest
     wrong_u, _ = plain.place(1.0 - (far * ohms + at_b) / (ohms + at_a + at_b), 0.5)
     gain = (ohms + at_a + at_b) / ohms
-    along = (0.5 * (gain - 1.0) - at_b / ohms, gain - 1.0, 0.0, 0.0, 0.0)
+    along = (0.5 * (gain - 1.0) - at_b / ohms, gain - 1.0, 0.0, 0.0, 0.0, 0.0)
     u, _ = PlaceMap(cone, along).apply(wrong_u, 1.0)
     assert abs(wrong_u - contact.u) > 1e-3
     assert u == pytest.approx(contact.u, rel=1e-12)

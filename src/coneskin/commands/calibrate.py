@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -154,9 +155,15 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         "it holds how well the marks were placed and touched"
     )
     print(
-        f"  fitted      along: {record.fitted_along}; around: {record.fitted_around}; known to "
-        f"{record.map_error_mm:.2f} mm at the worst place"
+        f"  fitted      along: {record.fitted_along}; around: {record.fitted_around}; {record.map_error_mm:.2f} mm "
+        "along and around each is left at other places (rms)"
     )
+    if result.fit is not None:
+        place, more = (
+            result.fit.next_mark,
+            "enough marks; one more" if result.fit.enough else "too few: touch one more,",
+        )
+        print(f"  next        {more} at {1e3 * place.u:.0f} mm, {math.degrees(place.phi):.0f} deg would tell most")
     print(f"  as leads    {leads} ohm more than lead_ohm, if it is leads")
     print(f"  sheets      {record.sheet_ohm[0]:.0f} and {record.sheet_ohm[1]:.0f} ohm per square, by their currents")
     if record.forces_n:

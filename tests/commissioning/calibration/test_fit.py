@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from coneskin.commissioning.calibration.calibrate import MARK_COUNTS, calibration_marks
-from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
+from coneskin.commissioning.calibration.fit import CalibrationFit, KnownTouch, fit_map
 from coneskin.commissioning.misreadings import WRONG, Place, misread
 from coneskin.core.errors import SkinError
 from coneskin.geometry.frustum import Frustum
@@ -18,8 +18,9 @@ from coneskin.skin.sensor import Sensor
 FOREARM = Frustum(0.0376, 0.0372, 0.26, math.radians(350.0))
 PAPER = Frustum(0.025, 0.05, 0.0968, 6.0)  # its radii double, as those of the paper's sector
 SENSORS = [Sensor(FOREARM), Sensor(PAPER, polarity=Polarity("A", "D"))]
-AFFINE = PlaceMap(FOREARM, (0.004, -0.012, 0.0, 0.0, 0.0), (-0.006, 0.02, 0.0, 0.0, 0.0))
-BENT = ((0.004, -0.012, 0.03, 0.08, -0.06), (-0.006, 0.02, -0.05, 0.04, 0.07))
+AFFINE = PlaceMap(FOREARM, (0.004, -0.012, 0.02, 0.0, 0.0, 0.0), (-0.006, 0.02, -0.01, 0.0, 0.0, 0.0))
+BENT = ((0.004, -0.012, 0.0, 0.03, 0.08, -0.06), (-0.006, 0.02, 0.0, -0.05, 0.04, 0.07))
+PRECISE = 1e-6  # m; marks so well placed that no prior counts
 
 
 def touched(
@@ -46,68 +47,66 @@ def distance(cone: Frustum, place: tuple[float, float], other: tuple[float, floa
 
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("count", MARK_COUNTS)
-def test_offset_and_gain_are_recovered_exactly(sensor: Sensor, count: int) -> None:
+def test_offset_gain_and_shear_are_recovered(sensor: Sensor, count: int) -> None:
     true = PlaceMap(sensor.frustum, AFFINE.along, AFFINE.around)
-    fit = fit_map(sensor, touched(sensor, through(true), count))
-    assert (fit.along, fit.around) == ("offset and gain", "offset and gain")
-    assert fit.place_map.along == pytest.approx(true.along, abs=1e-12)
-    assert fit.place_map.around == pytest.approx(true.around, abs=1e-12)
+    fit = fit_map(sensor, touched(sensor, through(true), count), PRECISE)
+    assert fit.place_map.along == pytest.approx(true.along, abs=2e-5)
+    assert fit.place_map.around == pytest.approx(true.around, abs=2e-5)
     assert fit.before.rms > 1e-3
-    assert fit.after.largest < 1e-12
     assert all(fit.used)
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_a_bend_is_recovered_where_there_are_enough_touches(sensor: Sensor) -> None:
     true = PlaceMap(sensor.frustum, *BENT)
-    fit = fit_map(sensor, touched(sensor, through(true), 16))
-    assert (fit.along, fit.around) == ("offset, gain and bend", "offset, gain and bend")
-    assert fit.place_map.along == pytest.approx(true.along, abs=1e-12)
-    assert fit.place_map.around == pytest.approx(true.around, abs=1e-12)
-    assert fit_map(sensor, touched(sensor, through(true), 4)).along != "offset, gain and bend"
+    fit = fit_map(sensor, touched(sensor, through(true), 16), PRECISE)
+    assert (fit.along, fit.around) == ("offset, gain, shear and bend", "offset, gain, shear and bend")
+    assert fit.place_map.along == pytest.approx(true.along, abs=2e-5)
+    assert fit.place_map.around == pytest.approx(true.around, abs=2e-5)
+
+
+def judged(sensor: Sensor, fit: CalibrationFit, reads: Callable[[Place], Place], rng: random.Random) -> float:
+    """Root mean square error at places that were not touched [m]."""
+    cone, squares = sensor.frustum, []
+    for _ in range(40):
+        place = Place(rng.uniform(0.03, 0.97) * cone.slant, rng.uniform(0.03, 0.97) * cone.wrap)
+        squares.append(distance(cone, fit.place_map.apply(*reads(place)), place) ** 2)
+    return math.sqrt(sum(squares) / len(squares))
 
 
 def test_a_perfect_skin_is_mostly_left_alone() -> None:
-    (sensor, _), left_alone = SENSORS, 0
-    for seed in range(20):
-        fit = fit_map(sensor, touched(sensor, lambda place: place, 9, 0.3e-3, seed))
-        left_alone += (fit.along == "nothing") + (fit.around == "nothing")
-        assert fit.after.rms <= fit.before.rms
-        worst = max(
-            distance(sensor.frustum, fit.place_map.apply(u, phi), (u, phi))
-            for u in (0.02, 0.13, 0.24)
-            for phi in (0.3, 3.0, 5.8)
-        )
-        assert fit.map_error > 0.15e-3  # also where nothing was fitted: so well do nine touches exclude it
-        assert worst < 1.2e-3  # four times the error with which the marks were placed
-    assert left_alone >= 36
+    (sensor, _), rng = SENSORS, random.Random(2)
+    fits = [fit_map(sensor, touched(sensor, lambda place: place, 9, 0.3e-3, seed)) for seed in range(20)]
+    errors = [judged(sensor, fit, lambda place: place, rng) for fit in fits]
+    assert math.sqrt(sum(e * e for e in errors) / 20) < 0.12e-3  # the marks alone would leave .25 mm
+    assert all(fit.map_error > 0.05e-3 for fit in fits)  # so well do nine touches exclude that anything is wrong
 
 
-def test_the_error_of_the_map_is_what_is_stated() -> None:
+def test_the_error_of_the_map_is_what_is_stated_for_places_that_nobody_touched() -> None:
+    sensor, rng = SENSORS[0], random.Random(3)
+    true = PlaceMap(sensor.frustum, *BENT)
+    squares = said = 0.0
+    for seed in range(24):
+        fit = fit_map(sensor, touched(sensor, through(true), 16, 0.3e-3, seed))
+        squares += judged(sensor, fit, through(true), rng) ** 2
+        said += 2.0 * fit.map_error**2  # along and around
+    assert 0.8 < math.sqrt(said / squares) < 1.4  # that nothing else is wrong with the sheet, 16 touches do not show
+
+
+def test_the_next_mark_is_where_the_map_is_known_least() -> None:
     sensor = SENSORS[0]
-    true = PlaceMap(sensor.frustum, AFFINE.along, AFFINE.around)
-    squares, stated, corner = [], [], (0.0, 0.0)
-    for seed in range(36):
-        fit = fit_map(sensor, touched(sensor, through(true), 9, 0.3e-3, seed), 0.1e-3)
-        if fit.along == fit.around == "offset and gain":
-            read = true.invert(*corner)
-            moved = [axis.apply(0.02, 0.3) for axis in (fit.place_map, true)]  # inside, where nothing is held at a rim
-            assert distance(sensor.frustum, moved[0], moved[1]) < 1e-3
-            gains = [fit.place_map.along[k] - true.along[k] for k in (0, 1)]
-            turns = [fit.place_map.around[k] - true.around[k] for k in (0, 1)]
-            along = (gains[0] - 0.5 * gains[1]) * sensor.frustum.slant
-            around = (turns[0] - 0.5 * turns[1]) * sensor.frustum.wrap * sensor.frustum.radius1
-            squares.append(along**2 + around**2)
-            stated.append(fit.map_error**2)
-            assert read != corner
-    assert len(squares) > 30
-    assert sum(squares) / sum(stated) == pytest.approx(1.0, abs=0.4)  # two numbers a try: a deviation of 17 %
+    true = PlaceMap(sensor.frustum, *BENT)
+    touches = [t for t in touched(sensor, through(true), 16, 0.3e-3) if t.mark.u < 0.8 * sensor.frustum.slant]
+    fit = fit_map(sensor, touches)
+    assert fit.next_mark.u > 0.8 * sensor.frustum.slant
+    assert not fit.enough
+    assert fit_map(sensor, touched(sensor, through(AFFINE), 16, 0.3e-3)).enough
 
 
 @pytest.mark.parametrize("count", [9, 16])
 def test_a_touch_beside_its_mark_is_left_out_and_named(count: int) -> None:
     sensor = SENSORS[0]
-    true = PlaceMap(sensor.frustum, AFFINE.along, AFFINE.around)
+    true = PlaceMap(sensor.frustum, (0.004, -0.012, *[0.0] * 4), (-0.006, 0.02, *[0.0] * 4))
     for seed in range(count):
         touches = touched(sensor, through(true), count, 0.3e-3, seed)
         wrong = touches[seed]
@@ -125,8 +124,8 @@ def test_leads_come_out_in_ohm() -> None:
         far = 1.0 - sensor.fractions(*place)[0]
         return Place(sensor.place(1.0 - (far * ohms + at_b) / (ohms + at_a + at_b), 0.5)[0], place.phi)
 
-    fit = fit_map(sensor, touched(sensor, reads))
-    assert fit.extra_ohms == pytest.approx((at_a, at_b, 0.0, 0.0), abs=1e-9)
+    fit = fit_map(sensor, touched(sensor, reads), PRECISE)
+    assert fit.extra_ohms == pytest.approx((at_a, at_b, 0.0, 0.0), abs=0.05)
 
 
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda wrong: str(wrong[:3]))

@@ -1,8 +1,10 @@
 """Fit of a place map to touches of known places: robust, and no richer than the touches support.
 
-For each of the two fractions in turn: nothing, an offset, offset and gain (which unknown leads, joints, and electrodes
-that are off their drawing make), and three terms that bend (sheets that are not uniform). A richer one is taken only
-where it predicts the touches that it was not fitted to better: leave-one-out cross-validation (Stone 1974).
+For each of the two fractions: offset, gain and shear (unknown leads and joints, electrodes off their drawing, a sheet
+that is mounted askew), and three terms that bend (sheets that are not uniform). Each group has a normal prior about 0.
+How wide it is, and how much beside the marks' own error is left unexplained, is not known: all of a grid of widths are
+fitted, and each weighs as much as it makes the touches likely (Bayesian model averaging). What is not there is left
+alone. The same gives the covariance of the map, and from that its error at places that nobody has touched.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -134,21 +136,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-#: names of what is fitted to a fraction -> its number of terms, and by which factor it must predict better
-_FIT_MODELS = {
-    "nothing": (0, 1.0),
-    "offset": (1, 0.95),
-    "offset and gain": (2, 0.95),
-    "offset, gain and bend": (5, 0.7),
-}
+_AFFINE_TERMS = 3
+_AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset, gain and shear
+_BEND_WIDTHS = (0.0, 0.005, 0.02, 0.06)  # of the terms that bend
+_REST_RATIOS = (1.0, 1.3, 2.0, 4.0, 8.0)  # standard deviation of a touch over the marks' own error
+_SIMPLER_ODDS = 3.0  # that a group of terms, or anything beside them, is not there, before any touch
+_ENOUGH_SHARE = 0.9  # of the map's error; another mark that leaves more of it is not worth its touch
 _MIN_ROBUST = 6  # touches; among fewer none can be called wrong
 _MAX_WRONG = 0.25  # part of the touches that may be left out
 _MAX_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
 _MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 _MIN_SPACING = 0.3  # of a fraction, between two touches that a first line is laid through
-_MARK_ERRORS = 1.2  # mark errors; what marks that were placed so explain by themselves needs no map
-_MIN_ERROR = 0.02e-3  # m; a model that predicts so well needs no richer one
-_GRID_POINTS = 21  # places along and around at which the error of the map is looked at
+_GRID_POINTS = 11  # places along and around at which the error of the map is looked at
 
 
 class Errors(NamedTuple):
@@ -177,7 +176,10 @@ class CalibrationFit:
         after: the same with maps fitted without the touch that is judged: cross-validated. Both hold the error with
             which the marks were placed and found, so that the map is better than this.
         left: of each touch, along and around, what a map fitted without it misses its mark by [m].
-        map_error: standard error of the map at the worst place of the sheet [m].
+        map_error: standard deviation, along and around each, of the map at places that were not touched: root mean
+            square over the sheet [m]. The error of the marks themselves is no part of it.
+        next_mark: place whose touch would tell most.
+        enough: another touch, there, would hardly make the map better.
         extra_ohms: of A, B, C and D: what the offsets and gains are if they are unknown leads and joints [ohm].
     """
 
@@ -189,6 +191,8 @@ class CalibrationFit:
     after: Errors
     left: tuple[tuple[float, float], ...]
     map_error: float
+    next_mark: Place
+    enough: bool
     extra_ohms: tuple[float, float, float, float]
 
 
@@ -225,13 +229,14 @@ def fit_map(
     axes = _axes(sensor, touches)
     used = _agreeing(axes, mark_error)
     inside = [axis.pick(used) for axis in axes]
-    affine = [_solve(axis, 2).tolist() for axis in inside]
+    affine = [_solve(axis, _AFFINE_TERMS).tolist() for axis in inside]
     _check_offsets_and_gains(sensor, affine[0][:2], affine[1][:2], sheet_ohms)
-    chosen = [_choose(axis, mark_error) for axis in inside]
-    numbers = [_solve(axis, _FIT_MODELS[name][0]).tolist() for axis, name in zip(inside, chosen, strict=True)]
+    posteriors = [_average(axis, mark_error) for axis in inside]
+    numbers = [posterior.numbers.tolist() for posterior in posteriors]
     _check_bends(sensor, *numbers)
     place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
-    left = [_left_out(axis, _FIT_MODELS[name][0]) * axis.metres for axis, name in zip(inside, chosen, strict=True)]
+    left = [posterior.left for posterior in posteriors]
+    map_error, next_mark, then = _untouched_error(sensor, posteriors, mark_error)
     every = [
         (axis.missing - axis.terms @ np.array(values)) * axis.metres for axis, values in zip(axes, numbers, strict=True)
     ]
@@ -239,13 +244,15 @@ def fit_map(
         whole[used] = part
     return CalibrationFit(
         place_map,
-        chosen[0],
-        chosen[1],
+        posteriors[0].words,
+        posteriors[1].words,
         tuple(bool(value) for value in used),
         Errors.of(inside[0].missing * inside[0].metres, inside[1].missing * inside[1].metres),
         Errors.of(left[0], left[1]),
         tuple(zip(every[0].tolist(), every[1].tolist(), strict=True)),
-        _worst_error(sensor, inside, chosen, mark_error),
+        map_error,
+        next_mark,
+        then > _ENOUGH_SHARE * map_error,
         _extra_ohms(sensor, place_map),
     )
 
@@ -294,30 +301,65 @@ def _solve(axis: _Axis, count: int) -> Floats:
     return numbers
 
 
-def _left_out(axis: _Axis, count: int) -> Floats:
-    """Return what is missing to each mark with the numbers that fit the other touches [parts]."""
-    rest = axis.missing - axis.terms @ _solve(axis, count)
-    if not count:
-        return rest
-    q, _ = np.linalg.qr(axis.terms[:, :count] * axis.metres[:, None])
-    leverage = np.sum(q * q, axis=1)
-    left: Floats = rest / np.maximum(1.0 - leverage, 1e-9)
-    return left
+class _Posterior(NamedTuple):
+    """What the touches leave of the numbers of one fraction."""
+
+    numbers: Floats
+    covariance: Floats
+    rest: float  #: variance of the sheet beside its map [m^2]
+    left: Floats  #: what a map without each touch misses its mark by [m]
+    words: str
 
 
-def _choose(axis: _Axis, mark_error: float) -> str:
-    """Return the richest model that predicts better than each simpler one by its factor."""
-    best, error = "nothing", math.inf
-    if np.sqrt(np.mean((axis.missing * axis.metres) ** 2)) < _MARK_ERRORS * mark_error:
-        return best
-    for name, (count, factor) in _FIT_MODELS.items():
-        independent = np.linalg.matrix_rank(axis.terms[:, :count], tol=1e-3) if count else 0
-        if len(axis.missing) < count + 2 or independent < count:
-            continue
-        found = float(np.sqrt(np.mean((_left_out(axis, count) * axis.metres) ** 2)))
-        if best == name or (found < factor * error and error > _MIN_ERROR):
-            best, error = name, found
-    return best
+def _average(axis: _Axis, mark_error: float) -> _Posterior:
+    """Fit all widths of the priors, and average by how likely each makes the touches."""
+    design, missing = axis.terms * axis.metres[:, None], axis.missing * axis.metres
+    count = len(missing)
+    fits = []
+    for affine, bend, ratio in product(_AFFINE_WIDTHS, _BEND_WIDTHS, _REST_RATIOS):
+        prior = np.repeat([affine**2, bend**2], _AFFINE_TERMS)
+        noise = (ratio * mark_error) ** 2
+        spread = design * prior
+        inverse = np.linalg.inv(spread @ design.T + noise * np.eye(count))
+        gain = spread.T @ inverse
+        likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
+        likely += ((affine == 0.0) + (bend == 0.0) + (ratio == 1.0)) * math.log(_SIMPLER_ODDS)
+        fits.append((likely, gain, np.diag(prior) - gain @ spread, noise - mark_error**2, bend > 0.0))
+    most = max(fit[0] for fit in fits)
+    weights = np.array([math.exp(fit[0] - most) for fit in fits])
+    weights /= weights.sum()
+    each = [fit[1] @ missing for fit in fits]
+    gain = sum(weight * fit[1] for weight, fit in zip(weights, fits, strict=True))
+    numbers = gain @ missing
+    covariance = sum(
+        weight * (fit[2] + np.outer(one - numbers, one - numbers))
+        for weight, fit, one in zip(weights, fits, each, strict=True)
+    )
+    smoothed = design @ gain
+    left = (missing - smoothed @ missing) / np.maximum(1.0 - np.diag(smoothed), 1e-9)
+    rest = sum(weight * fit[3] for weight, fit in zip(weights, fits, strict=True))
+    bends = sum(weight for weight, fit in zip(weights, fits, strict=True) if fit[4])
+    words = "offset, gain, shear and bend" if bends > 0.5 else "offset, gain and shear"
+    return _Posterior(numbers, np.asarray(covariance), float(rest), left, words)
+
+
+def _untouched_error(sensor: Sensor, posteriors: Sequence[_Posterior], mark_error: float) -> tuple[float, Place, float]:
+    """Return the error of the map over the sheet [m], the place that a touch would tell most of, and the error then."""
+    cone = sensor.frustum
+    parts = (np.arange(_GRID_POINTS) + 0.5) / _GRID_POINTS
+    places = [Place(float(a * cone.slant), float(b * cone.wrap)) for a in parts for b in parts]
+    terms = np.array([map_terms(*_fractions(sensor, place)) for place in places])
+    metres = np.array([(cone.slant / _slope(sensor, p.u), cone.wrap * cone.radius_at(p.u)) for p in places])
+    now, then = np.zeros(len(places)), np.zeros(len(places))
+    for k, posterior in enumerate(posteriors):
+        design = terms[:, k] * metres[:, k, None]
+        between = design @ posterior.covariance @ design.T
+        own = np.diag(between)
+        noise = mark_error**2 + posterior.rest
+        now += own + posterior.rest
+        then += np.mean(own) + posterior.rest - np.mean(between**2, axis=0) / (own + noise)
+    best = int(np.argmin(then))
+    return math.sqrt(0.5 * max(0.0, float(np.mean(now)))), places[best], math.sqrt(0.5 * max(0.0, float(then[best])))
 
 
 def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
@@ -353,29 +395,6 @@ def _least_median(axis: _Axis) -> Floats:
             if (median := float(np.median(np.abs(rest)))) < least:
                 best, least = rest, median
     return best
-
-
-def _worst_error(sensor: Sensor, axes: Sequence[_Axis], models: Sequence[str], mark_error: float) -> float:
-    cone, worst = sensor.frustum, 0.0
-    covariances = []
-    for axis, name in zip(axes, models, strict=True):
-        count = max(_FIT_MODELS[name][0], 2)  # an offset and a gain that were not fitted are not known any better
-        rest = (axis.missing - axis.terms @ _solve(axis, count)) * axis.metres
-        variance = max(float(rest @ rest) / max(len(rest) - count, 1), mark_error**2)
-        weighed = axis.terms[:, :count] * axis.metres[:, None]
-        covariances.append(variance * np.linalg.inv(weighed.T @ weighed))
-    for i in range(_GRID_POINTS):
-        for j in range(_GRID_POINTS):
-            u, phi = cone.slant * i / (_GRID_POINTS - 1), cone.wrap * j / (_GRID_POINTS - 1)
-            metres = cone.slant / _slope(sensor, u), cone.wrap * cone.radius_at(u)
-            variance = 0.0
-            for covariance, terms, metre in zip(
-                covariances, map_terms(*_fractions(sensor, Place(u, phi))), metres, strict=True
-            ):
-                term = np.array(terms[: len(covariance)])
-                variance += metre**2 * float(term @ covariance @ term)
-            worst = max(worst, variance)
-    return math.sqrt(worst)
 
 
 def _extra_ohms(sensor: Sensor, place_map: PlaceMap) -> tuple[float, float, float, float]:

@@ -76,7 +76,7 @@ class CalibrationRecord:
         before_largest_mm: largest of these distances [mm].
         after_rms_mm: the same with a map, cross-validated [mm].
         after_largest_mm: largest of these distances [mm].
-        map_error_mm: standard error of the map at the worst place [mm].
+        map_error_mm: standard deviation of a place that was not touched, along and around each [mm].
         extra_ohm: unknown leads and joints of A, B, C and D, if it is those [ohm].
         sheet_ohm: what its untouched sheets have per square, upper and lower, as their currents say [ohm].
         touches: in the order in which they were made.

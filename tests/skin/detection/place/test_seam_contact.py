@@ -167,7 +167,7 @@ def test_every_polarity_finds_the_seam(radial, angular):
 
 
 def test_a_calibration_moves_a_seam_place_along_the_side_alone():
-    shift = PlaceMap(FULL, (0.01, 0.0, 0.0, 0.0, 0.0), (0.01, 0.0, 0.0, 0.0, 0.0))
+    shift = PlaceMap(FULL, (0.01, 0.0, 0.0, 0.0, 0.0, 0.0), (0.01, 0.0, 0.0, 0.0, 0.0, 0.0))
     last: dict[bool, TouchReading] = {}
     for mapped in (False, True):
         sensor = Sensor(FULL, place_map=shift if mapped else None)
