@@ -19,14 +19,15 @@ ROOT = Path(__file__).parent
 #: modules of the live path, of replays, and of the field's single scenes, by the library that they become; each library
 #: is one run of the C compiler
 COMPILED = {
-    "skin": ("core/version", "skin/*", "skin/detection/*", "skin/detection/*/*", "skin/field/one_scene"),
+    "core": ("core/version", "core/channel", "core/recording/block"),
+    "skin": ("skin/*", "skin/sources/serial_port", "skin/detection/*", "skin/detection/*/*", "skin/field/one_scene"),
     "robot": ("robot/driver/*", "robot/stop/*", "robot/guard/*", "robot/guard/*/*", "robot/ur/*"),
     "motion": ("robot/arm/*", "robot/reaction/*"),
 }
-#: core/recording stays Python: compiled, it decodes chunks no faster (76 ms for a run of 60 s, 69 as it is, 45 of them
-#: zlib's), and a compiled generator that is dropped half-way runs no ``finally``, so its ``with`` leaves files open
-#: what stays Python there: an enumeration with a __new__, empty named tuples, protocols, a keyword of C as a name
-UNFIT = {"journal", "messages", "deadman", "protocol"}
+#: the rest of core/recording stays Python: compiled, it decodes chunks no faster (76 ms for a run of 60 s, 69 as it is,
+#: 45 of them zlib's), and a compiled generator that is dropped half-way runs no ``finally``, so files stay open
+#: what stays Python there: an enumeration with a __new__, protocols, a keyword of C as a name
+UNFIT = {"journal", "deadman", "protocol"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays
 PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
 PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry"}

@@ -30,7 +30,7 @@ from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.serial_port import SerialPort
 
 from .far_end import CLOCK, CYCLE_FRAMES, SENSOR, TOUCHED_FRAMES, FarEnd
-from .stamps import Stamp, StampedChannel, StampedPort, Stamps
+from .stamps import Stamp, stamps_of
 
 SKIN_TIMEOUT = 0.5  # s; frames that the machine holds up are no matter here
 RESET_PERIOD = 0.02  # s
@@ -55,10 +55,10 @@ class States:
 
 @dataclass
 class Guarded:
-    """Guard's loop, with a stamp between its stages.
+    """Guard's loop. What it records of itself tells when it has read and sent.
 
     Attributes:
-        wake, decide, send, react, idle, whole: times [s], as the table names them.
+        wake, react, idle, whole: times [s], as the table names them.
         answered: touches in which a stop was sent because of the touch.
         missed: touches of an active guard without a stop.
         inactive: touches that came while the guard was not active, by the reason for that.
@@ -66,8 +66,6 @@ class Guarded:
     """
 
     wake: list[float] = field(default_factory=list)
-    decide: list[float] = field(default_factory=list)
-    send: list[float] = field(default_factory=list)
     react: list[float] = field(default_factory=list)
     idle: list[float] = field(default_factory=list)
     whole: list[float] = field(default_factory=list)
@@ -78,21 +76,18 @@ class Guarded:
 
     def turn(self, rate_hz: float, seconds: float) -> None:
         """Guard for some time, resetting after each touch."""
-        stamps = Stamps()
         with FarEnd(rate_hz) as far, SerialPort(far.path) as port:
-            stamps.core = core = make_core()
+            core, rounds = make_core(), list[float]()
             (ours, recorder), (end, arm) = pair(), pair()
-            session, driver = Channel(ours), StampedChannel(end)
-            driver.stamps = stamps
-            ports = GuardPorts(session, StampedPort(port, stamps), States(far.states), driver)  # type: ignore[arg-type]
-            loop = GuardLoop(core, ports, CLOCK)
+            session, driver = Channel(ours), Channel(end)
+            loop = GuardLoop(core, GuardPorts(session, port, States(far.states), driver), CLOCK)
             loop._open()
             core.feed(Block(BlockKind.DRIVER, CLOCK(), StatusReport("ready").encode()), [])
             over, reset_at, spoke, recorded = CLOCK() + seconds + 0.5, 0.0, 0.0, list[bytes]()
             gc.disable()
             while CLOCK() < over:
                 loop.poll(0.002)
-                stamps.done()
+                rounds.append(CLOCK())
                 if CLOCK() - spoke > 0.02:
                     spoke = CLOCK()
                     core.feed(Block(BlockKind.PROGRAM, spoke, b""), [])
@@ -110,10 +105,10 @@ class Guarded:
             written = far.written()
         for channel in (session, driver, recorder, arm):
             channel.close()
-        stamps.explain(messages(b"".join(recorded)))
-        for stamp in stamps.all:
+        stamps = stamps_of(messages(b"".join(recorded)), rounds)
+        for stamp in stamps:
             self._count(stamp, written)
-        self._judge(stamps.all)
+        self._judge(stamps)
 
     def _count(self, stamp: Stamp, written: dict[int, float]) -> None:
         """Add the times of one read."""
@@ -124,8 +119,6 @@ class Guarded:
         if not stamp.sent:
             self.idle.append(stamp.done - stamp.read)
         elif stamp.why == "touch":
-            self.decide.append(stamp.decided - stamp.read)
-            self.send.append(stamp.sent - stamp.decided)
             self.react.append(stamp.sent - stamp.read)
             self.whole.append(stamp.sent - at)
 
@@ -142,10 +135,10 @@ class Guarded:
         for seen in touches.values():
             if any(stamp.why == "touch" for stamp in seen):
                 self.answered += 1
-            elif seen[0].phase is Phase.ACTIVE and not any(stamp.sent for stamp in seen):
+            elif seen[0].active and not any(stamp.sent for stamp in seen):
                 self.missed += 1
             else:
-                self.inactive[seen[0].reason if seen[0].phase is not Phase.ACTIVE else seen[-1].reason] += 1
+                self.inactive[seen[0].reason if not seen[0].active else seen[-1].reason] += 1
 
 
 def make_core() -> GuardCore:

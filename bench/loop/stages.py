@@ -24,6 +24,7 @@ import sys
 from dataclasses import dataclass, field
 
 from bench.report import head, quantile
+from coneskin.core.version import code_build
 from coneskin.skin.wire import FRAME_LENGTH
 
 from .far_end import CLOCK, CYCLE_FRAMES, FarEnd
@@ -96,12 +97,13 @@ def main() -> int:
     row("baseline: written at the far end -> read", baseline.wake)
     row("guard: written at the far end -> read", guarded.wake)
     row("baseline: read -> sent", baseline.sent)
-    row("guard: read -> stop decided and encoded", guarded.decide)
-    row("guard: decided -> written to the driver process", guarded.send)
     row("guard: READ -> COMMAND WRITTEN, touches", guarded.react)
     row("guard: read -> done, frames without a touch", guarded.idle)
     row("baseline: written at the far end -> sent", baseline.whole)
     row("guard: written at the far end -> command written", guarded.whole)
+    if guarded.whole:
+        ratio = quantile(guarded.whole, 0.5) / quantile(baseline.whole, 0.5)
+        print(f"guard / baseline, written at the far end -> sent, median: {ratio:.2f} ({code_build()})")
     verdict(guarded)
     return 1 if guarded.missed else 0
 

@@ -1,20 +1,17 @@
-"""Stamps of bench `loop`: when each stage of the guard's loop was done with a frame, and what the guard was then."""
+"""Stamps of bench `loop`: when the guard's loop read each frame and sent each stop, by the recording of its own."""
 
 from __future__ import annotations
 
-import math
 import re
-from dataclasses import dataclass, field
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from coneskin.core.channel import Channel
 from coneskin.core.recording.block import decode_blocks
-from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, decode_event
-from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.wire import FrameDecoder
 
-from .far_end import CLOCK
+_STOP_HEAD = b"driver\nS"  # of the command
 
 
 @dataclass(slots=True)
@@ -23,96 +20,48 @@ class Stamp:
 
     Attributes:
         read: when [s].
-        data: what was read.
-        phase: of the guard then.
         sequences: of the frames that were read whole; usually one, and none where a frame was cut.
+        active: the guard was active then.
         reason: why the guard was last stopped or kept from becoming active, where it is not active.
-        decided: when a stop was decided [s]; 0 without one.
-        sent: when it was sent [s].
-        why: of that stop.
         done: when the loop's round was over [s].
+        sent: when a stop was sent [s]; 0 without one.
+        why: of that stop.
     """
 
     read: float
-    data: bytes
-    phase: Phase
-    sequences: tuple[int, ...] = ()
-    reason: str = ""
-    decided: float = 0.0
+    sequences: tuple[int, ...]
+    active: bool
+    reason: str
+    done: float
     sent: float = 0.0
     why: str = ""
-    done: float = 0.0
 
 
-@dataclass
-class Stamps:
-    """Clock around the stages of the loop.
+def stamps_of(recorded: bytes, rounds: Sequence[float]) -> list[Stamp]:
+    """Return the reads in what a guard has recorded.
 
-    Attributes:
-        all: in order.
-        core: whose phase is noted.
+    Args:
+        recorded: its blocks.
+        rounds: when each round of its loop was over [s].
     """
-
-    all: list[Stamp] = field(default_factory=list)
-    core: GuardCore | None = None
-
-    def read(self, data: bytes) -> None:
-        """Stamp what has just been read. It is looked at later: the guard waits."""
-        now = CLOCK()
-        assert self.core is not None
-        self.all.append(Stamp(now, data, self.core.phase))
-
-    def done(self) -> None:
-        """Stamp that a round of the loop is over."""
-        if self.all and not self.all[-1].done:
-            self.all[-1].done = CLOCK()
-
-    def explain(self, recorded: bytes) -> None:
-        """Say which frames each read has, why the guard was not active, and why it stopped, from its recording."""
-        decoder = FrameDecoder()
-        events = [decode_event(block) for _, block in decode_blocks(recorded) if block.kind == BlockKind.EVENT]
-        reason, at = "it has not been active yet", 0
-        ends = [stamp.read for stamp in self.all[1:]] + [math.inf]
-        for stamp, end in zip(self.all, ends, strict=True):
-            stamp.sequences = tuple(frame.sequence for frame in decoder.feed(stamp.data))
-            stamp.reason = reason
-            while at < len(events) and events[at].time < end:
-                event, at = events[at], at + 1
-                what = event.details.get("why") or event.details.get("what") or event.details.get("reasons")
-                if event.name in ("stopping", "fault", "refused", "waiting"):
-                    reason = without_numbers(str(what))
-                if event.name == "stopping" and stamp.sent and not stamp.why:
-                    stamp.why = reason
-
-
-class StampedPort:
-    """Port that stamps when it has read."""
-
-    def __init__(self, port: SerialPort, stamps: Stamps) -> None:
-        self._port, self._stamps = port, stamps
-        self.name, self.fileno = port.name, port.fileno
-
-    def read(self, timeout: float) -> bytes:
-        """Read as the port does."""
-        data = self._port.read(timeout)
-        self._stamps.read(data)
-        return data
-
-
-class StampedChannel(Channel):
-    """Channel to the driver process that stamps before and after a stop is sent."""
-
-    stamps: Stamps
-
-    def send(self, message: bytes) -> bool:
-        """Send as a channel does."""
-        stamps = self.stamps.all
-        if message[:1] != b"S" or not stamps or stamps[-1].sent:
-            return super().send(message)
-        stamps[-1].decided = CLOCK()
-        taken = super().send(message)
-        stamps[-1].sent = CLOCK()
-        return taken
+    decoder, found = FrameDecoder(), list[Stamp]()
+    active, reason = False, "it has not been active yet"
+    for block in decode_blocks(recorded):
+        if block.kind == BlockKind.SKIN:
+            done = rounds[min(bisect_left(rounds, block.time), len(rounds) - 1)]
+            sequences = tuple(frame.sequence for frame in decoder.feed(block.payload))
+            found.append(Stamp(block.time, sequences, active, reason, done))
+        elif block.kind == BlockKind.COMMAND and block.payload.startswith(_STOP_HEAD) and found and not found[-1].sent:
+            found[-1].sent = block.time
+        elif block.kind == BlockKind.EVENT:
+            event = decode_event(block)
+            what = event.details.get("why") or event.details.get("what") or event.details.get("reasons")
+            active = event.name == "activated" or (active and event.name != "stopping")
+            if event.name in ("stopping", "fault", "refused", "waiting"):
+                reason = without_numbers(str(what))
+            if event.name == "stopping" and found and found[-1].sent and not found[-1].why:
+                found[-1].why = reason
+    return found
 
 
 def without_numbers(text: str) -> str:

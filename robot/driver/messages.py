@@ -6,6 +6,7 @@ The guard's commands are a letter and doubles, because they are sent from the li
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from coneskin.robot.arm.model import Joints
@@ -88,7 +89,8 @@ class Release(NamedTuple):
         return b"C" + _ONE_NUMBER.pack(self.number)
 
 
-class Heartbeat(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
     """Heartbeat of the guard, every ``BEAT_PERIOD``; without it for ``GUARD_SILENCE`` the arm is stopped."""
 
     def encode(self) -> bytes:
@@ -96,7 +98,8 @@ class Heartbeat(NamedTuple):
         return b"A"
 
 
-class Shutdown(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Shutdown:
     """Announcement that the guard ends on purpose, after it has seen the arm stand."""
 
     def encode(self) -> bytes:

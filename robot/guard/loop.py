@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import gc
 import json
-import os
 import select
-import selectors
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-from coneskin.core.channel import Channel
+from coneskin.core.channel import Channel, wait_readable
 from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
@@ -30,7 +28,7 @@ from coneskin.skin.sources.source import Source, SourceReopening
 from .controller_heartbeat import heartbeat_count
 from .core import GuardCore
 from .phase import Phase
-from .signals.journal import BlockKind, GuardEvent, Output, encode_loss
+from .signals.journal import BlockKind, Command, GuardEvent, Output, encode_command, encode_loss
 
 if TYPE_CHECKING:
     from _typeshed import HasFileno
@@ -78,55 +76,50 @@ class GuardPorts:
     helper: ProcessWatch | None = None
 
 
-_OWN_COMMANDS = (UseStopPath, JointVelocitySetpoint, SetpointProgram, SetSpeedSlider)
-
-
 class _Outbox:
-    """Sink that sends a command as soon as the core has decided it, and keeps the rest for the recorder."""
+    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder.
 
-    __slots__ = ("_ports", "events", "sent")
+    Args:
+        ports: of the loop.
+        clock: monotonic seconds.
 
-    def __init__(self, ports: GuardPorts) -> None:
-        self._ports = ports
-        self.sent: list[bytes] = []
+    Attributes:
+        sent: blocks of the commands, of the times at which they were sent.
+        events: of the core.
+    """
+
+    __slots__ = ("_clock", "_ports", "events", "sent")
+
+    def __init__(self, ports: GuardPorts, clock: Callable[[], float]) -> None:
+        self._ports, self._clock = ports, clock
+        self.sent: list[Block] = []
         self.events: list[GuardEvent] = []
 
     def append(self, output: Output, /) -> None:
         """Take an output of the core."""
-        ports = self._ports
         if isinstance(output, GuardEvent):
             self.events.append(output)
-        elif isinstance(output, _OWN_COMMANDS):
-            self._send_own(ports, output)
-        else:
-            message = output.encode()
-            name, channel = (b"driver", ports.driver) if ports.watchdog is None else (b"watchdog", ports.watchdog)
-            taken = channel is not None and channel.send(message)
-            self.sent.append(name + (b"\n" if taken else b", not sent\n") + message)
+            return
+        taken, now = self._send(output), self._clock()
+        process = "driver" if self._ports.watchdog is None else "watchdog"
+        self.sent.append(Block(BlockKind.COMMAND, now, encode_command(output, process, taken)))
 
-    def _send_own(
-        self, ports: GuardPorts, output: UseStopPath | JointVelocitySetpoint | SetpointProgram | SetSpeedSlider
-    ) -> None:
-        """Send a command over a connection of the guard's own."""
+    def _send(self, output: Command) -> bool:
+        ports = self._ports
         if isinstance(output, UseStopPath):
-            name = output.path.value
             if output.path is StopPath.WATCHDOG:
-                taken = ports.watchdog is not None and ports.watchdog.send(StopProgram(output.deceleration).encode())
-            elif output.path is StopPath.SLIDER:
-                taken = ports.slider is not None and ports.slider.set(0.0)
-            else:
-                taken = ports.stops is not None and ports.stops.use(*output)
-            text = "sent" if taken else "not sent"
-        elif isinstance(output, JointVelocitySetpoint):
-            taken = ports.setpoints is not None and ports.setpoints.write(output)
-            name, text = ("setpoint" if taken else "setpoint, not sent"), str(tuple(output))
-        elif isinstance(output, SetpointProgram):
-            taken = ports.stops is not None and ports.stops.follow(output)
-            name, text = ("follow" if taken else "follow, not sent"), str(tuple(output))
-        else:
-            taken = ports.slider is not None and ports.slider.set(output.fraction)
-            name, text = ("slider" if taken else "slider, not sent"), str(output.fraction)
-        self.sent.append(f"{name}\n{text}".encode())
+                return ports.watchdog is not None and ports.watchdog.send(StopProgram(output.deceleration).encode())
+            if output.path is StopPath.SLIDER:
+                return ports.slider is not None and ports.slider.set(0.0)
+            return ports.stops is not None and ports.stops.use(*output)
+        if isinstance(output, JointVelocitySetpoint):
+            return ports.setpoints is not None and ports.setpoints.write(output)
+        if isinstance(output, SetpointProgram):
+            return ports.stops is not None and ports.stops.follow(output)
+        if isinstance(output, SetSpeedSlider):
+            return ports.slider is not None and ports.slider.set(output.fraction)
+        channel = ports.driver if ports.watchdog is None else ports.watchdog
+        return channel is not None and channel.send(output.encode())
 
 
 _HEARTBEAT_BYTES = Heartbeat().encode()
@@ -141,6 +134,17 @@ _OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports tha
 _SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
 _FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
 _SHUTDOWN_TIMEOUT = 3.0  # s that the arm has to stand when the guard is told to end
+_MAX_READY = 16  # descriptors that one wait reports; the next one reports the others
+#: bits of what can be read
+_SKIN: Final = 1
+_READER: Final = 2
+_DRIVER: Final = 4
+_WATCHDOG: Final = 8
+_SLIDER: Final = 16
+_HEARTBEAT: Final = 32
+_STOPS: Final = 64
+_SESSION: Final = 128
+_SECOND: Final = 256
 
 
 def _boot_time() -> float:
@@ -169,13 +173,12 @@ class GuardLoop:
         self._ports = ports
         self._clock = clock
         self._sleepless_clock = sleepless_clock
-        self._rounds_at = (clock(), sleepless_clock())  # when the newest round began
-        self._selector = selectors.DefaultSelector()
-        self._names: dict[int, str] = {}  # descriptor -> attribute of the ports
-        #: the same set of descriptors, asked without what a selector does around it; None where the system has no epoll
-        self._epoll: Any = None
-        if isinstance(self._selector, getattr(selectors, "EpollSelector", ())):
-            self._epoll = select.epoll.fromfd(os.dup(self._selector.fileno()))
+        self._round_at, self._sleepless_at = clock(), sleepless_clock()  # when the newest round began
+        #: the skin has no descriptor that tells that it has bytes
+        self._blind = ports.source is not None and ports.source.fileno() is None
+        self._watched: dict[int, HasFileno] = {}
+        self._bits: dict[int, int] = {}  # of these descriptors
+        self._epoll: Any = select.epoll() if hasattr(select, "epoll") else None
         self._quit = False
         self._fed = False  # anything, in this step
         self._beat = -BEAT_PERIOD
@@ -184,7 +187,7 @@ class GuardLoop:
         self._count = 0  # sent last
         self._out: list[bytes] = []
         self._report_at = 0.0  # when the session is told next
-        self._outbox = _Outbox(ports)
+        self._outbox = _Outbox(ports, clock)
         self._gone: Source | None = None  # the skin's source, where it may be opened again
         self._reopening: SourceReopening | None = None
 
@@ -209,92 +212,117 @@ class GuardLoop:
 
     def _open(self) -> None:
         ports = self._ports
-        for name in ("session", "driver", "watchdog", "second", "reader", "slider", "heartbeat"):
-            if (item := getattr(ports, name)) is not None:
-                self._watch(item, name)
+        self._watch(ports.session, _SESSION)
+        self._watch(ports.driver, _DRIVER)
+        self._watch(ports.watchdog, _WATCHDOG)
+        self._watch(ports.second, _SECOND)
+        self._watch(ports.reader, _READER)
+        self._watch(ports.slider, _SLIDER)
+        self._watch(ports.heartbeat, _HEARTBEAT)
         if ports.source is not None:
             self._watch_skin(ports.source)
         for sock in ports.stops.sockets().values() if ports.stops else ():
-            self._watch(sock, "stops")
+            self._watch(sock, _STOPS)
         for what, why in ports.absent.items():
             self._feed(BlockKind.ABSENT, encode_loss(what, why))
 
     def _watch_skin(self, source: Source) -> None:
-        if (descriptor := source.fileno()) is not None:
-            self._watch(descriptor, "skin")
+        self._blind = source.fileno() is None
+        if not self._blind:
+            self._watch(source, _SKIN)  # type: ignore[arg-type]
 
-    def _watch(self, fileobj: int | HasFileno, name: str) -> None:
-        self._names[self._selector.register(fileobj, selectors.EVENT_READ).fd] = name
+    def _watch(self, item: HasFileno | None, bit: int) -> None:
+        if item is not None:
+            number = item.fileno()
+            self._watched[number], self._bits[number] = item, bit
+            if self._epoll is not None:
+                self._epoll.register(number, select.EPOLLIN)
 
-    def _wait(self, timeout: float) -> set[str]:
-        """Wait for input, or for the timeout [s], and return the names of what can be read."""
-        names = self._names
+    def _forget(self, item: object) -> None:
+        for number in [number for number, watched in self._watched.items() if watched is item]:
+            del self._watched[number], self._bits[number]
+            if self._epoll is not None:
+                with suppress(OSError):  # it is closed
+                    self._epoll.unregister(number)
+
+    def _wait(self, timeout: float) -> int:
+        """Wait for input, or for the timeout [s], and return the bits of what can be read."""
+        ready, bits = 0, self._bits
         if self._epoll is None:
-            return {names[key.fd] for key, _ in self._selector.select(timeout)}
-        return {names[descriptor] for descriptor, _ in self._epoll.poll(timeout)}
+            for item in wait_readable(list(self._watched.values()), timeout):
+                ready |= bits[item.fileno()]
+        else:
+            for number, _ in self._epoll.poll(timeout, _MAX_READY):
+                ready |= bits[number]
+        return ready
 
     def _close(self) -> None:
         if self._reopening is not None:
             self._reopening.stop()
         if self._epoll is not None:
             self._epoll.close()
-        self._selector.close()
 
     def poll(self, timeout: float) -> None:
         """Wait for input, or for the timeout [s], and serve it."""
-        ports, ready = self._ports, self._wait(timeout)
-        self._note_overrun()
-        arm_first = self._core.phase.stopping  # states that wait may show that the stop under way works
-        if arm_first and "reader" in ready:
+        ready = self._wait(timeout)
+        ports, now, before = self._ports, self._clock(), self._round_at
+        sleepless = self._sleepless_clock()
+        if now - before > _OVERRUN_TIME or sleepless - self._sleepless_at > _SUSPENSION_TIME:
+            self._note_overrun(now, now - before, sleepless - self._sleepless_at)
+        self._round_at, self._sleepless_at = now, sleepless
+        if ready & _READER and self._core.phase.stopping:  # states that wait may show that the stop under way works
             self._read(ports.reader, "controller", BlockKind.ARM)
-        if ports.source is not None and ("skin" in ready or ports.source.fileno() is None):
+            ready &= ~_READER
+        if ports.source is not None and (ready & _SKIN or self._blind):
             self._read_skin(ports.source)
-        if self._gone is not None and self._core.phase is Phase.LATCHED:
-            self._open_skin_again(self._gone)
-        for name, channel in (("driver", ports.driver), ("watchdog", ports.watchdog)):
-            if channel is not None and name in ready:  # before the states: they show what was announced here
-                self._read_channel(channel)
-        if ports.second is not None and "second" in ready:
+        if ready & _DRIVER:  # before the states: they show what was announced here
+            self._read_channel(ports.driver, "driver")
+        if ready & _WATCHDOG:
+            self._read_channel(ports.watchdog, "watchdog")
+        if ready & _SECOND and ports.second is not None:
             ports.second.receive()
             if ports.second.closed:
                 self._lose("second", "the second guard watchdog has ended", ports.second)
-        if not arm_first and "reader" in ready:
+        if ready & _READER:
             self._read(ports.reader, "controller", BlockKind.ARM)
-        if "slider" in ready:
+        if ready & _SLIDER:
             self._read(ports.slider, "slider", BlockKind.SLIDER)
-        if ports.heartbeat is not None and (count := heartbeat_count(self._clock())) != self._count:
+        if ready & _HEARTBEAT:
+            self._read(ports.heartbeat, "heartbeat", BlockKind.ECHO)
+        if ready & _STOPS and ports.stops is not None:
+            self._drain(ports.stops)
+        if ready & _SESSION:
+            self._read_session(ports.session)
+        if self._gone is not None and self._core.phase is Phase.LATCHED:
+            self._open_skin_again(self._gone)
+        if ports.heartbeat is not None and (count := heartbeat_count(now)) != self._count:
             self._count = count
             ports.heartbeat.write(count)
-        if "heartbeat" in ready:
-            self._read(ports.heartbeat, "heartbeat", BlockKind.ECHO)
-        if self._clock() - self._beat >= BEAT_PERIOD:
-            self._send_heartbeat()
+        if now - self._beat >= BEAT_PERIOD:
+            self._send_heartbeat(now)
             self._look_at_processes()
-        if "stops" in ready and ports.stops is not None:
-            self._drain(ports.stops)
-        if "session" in ready:
-            for message in ports.session.receive():
-                if message.startswith(b"reset "):
-                    self._feed(BlockKind.RESET, message.removeprefix(b"reset "))
-                elif message == b"quit":
-                    self._quit = True
-        if ports.session.closed:
-            self._quit = True
-            self._forget(ports.session)  # its end would be ready for ever
         if not self._fed:
             self._feed(BlockKind.TICK, b"")
         self._fed = False
-        if self._clock() >= self._report_at:
+        if now >= self._report_at:
             self._report()
 
-    def _note_overrun(self) -> None:
+    def _note_overrun(self, now: float, late: float, asleep: float) -> None:
         """Report how late this round is, to the core as well where nobody has guarded meanwhile."""
-        (before, sleepless_before), now, sleepless = self._rounds_at, self._clock(), self._sleepless_clock()
-        self._rounds_at = now, sleepless
-        if now - before > _OVERRUN_TIME:
-            self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": now - before}).encode()))
-        if sleepless - sleepless_before > _SUSPENSION_TIME:
-            self._feed(BlockKind.SUSPENDED, b"%.3f" % (sleepless - sleepless_before))
+        if late > _OVERRUN_TIME:
+            self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": late}).encode()))
+        if asleep > _SUSPENSION_TIME:
+            self._feed(BlockKind.SUSPENDED, b"%.3f" % asleep)
+
+    def _read_session(self, session: Channel) -> None:
+        for message in session.receive():
+            if message.startswith(b"reset "):
+                self._feed(BlockKind.RESET, message.removeprefix(b"reset "))
+            elif message == b"quit":
+                self._quit = True
+        if session.closed:
+            self._quit = True
+            self._forget(session)  # its end would be ready for ever
 
     def _report(self) -> None:
         """Tell the session what went in and came out: at once where anything was decided, else together with more."""
@@ -303,17 +331,18 @@ class GuardLoop:
             self._ports.session.send(b"".join(self._out))
             self._out.clear()
 
-    def _read_channel(self, channel: Channel) -> None:
+    def _read_channel(self, channel: Channel | None, name: str) -> None:
+        if channel is None:  # lost in this round
+            return
         self._helper_heard = self._clock()
         for message in channel.receive():
             self._feed(BlockKind.DRIVER, message)
         if channel.closed:
-            driver = channel is self._ports.driver
-            name, what = ("driver", "the driver process") if driver else ("watchdog", "the guard watchdog")
+            what = "the driver process" if name == "driver" else "the guard watchdog"
             self._lose(name, f"{what} has ended", channel)
 
-    def _send_heartbeat(self) -> None:
-        self._beat = now = self._clock()
+    def _send_heartbeat(self, now: float) -> None:
+        self._beat = now
         if self._ports.stops is not None and now - self._asked >= _QUESTION_PERIOD:
             self._asked = now
             self._ports.stops.ask()
@@ -331,11 +360,11 @@ class GuardLoop:
 
     def _read_skin(self, source: Source) -> None:
         try:
-            data = source.read(0.0 if source.fileno() is not None else _TICK_PERIOD)
+            data = source.read(_TICK_PERIOD if self._blind else 0.0)
         except SkinTimeout:
             return
         except ConeSkinError as exc:
-            self._lose("skin", str(exc), source.fileno())
+            self._lose("skin", str(exc), source)
             return
         self._feed(BlockKind.SKIN, data)
 
@@ -378,9 +407,9 @@ class GuardLoop:
         self._core.feed(block, outbox)
         self._record(block)
         if outbox.sent or outbox.events:
-            done = self._report_at = self._clock()
-            for line in outbox.sent:
-                self._record(Block(BlockKind.COMMAND, done, line))
+            self._report_at = 0.0  # at once
+            for sent in outbox.sent:
+                self._record(sent)
             for event in outbox.events:
                 self._record(event.block())
             outbox.sent.clear()
@@ -389,8 +418,8 @@ class GuardLoop:
     def _record(self, block: Block) -> None:
         self._out.append(encode_block(block))
 
-    def _lose(self, what: str, why: str, fileobj: object) -> None:
-        self._forget(fileobj)
+    def _lose(self, what: str, why: str, item: object) -> None:
+        self._forget(item)
         if what == "skin" and self._ports.reopen is not None:
             self._gone = self._ports.source
         setattr(self._ports, _PORT_ATTRIBUTES.get(what, what), None)
@@ -399,10 +428,6 @@ class GuardLoop:
             # it would connect again by itself, and its program start with whatever command is still there
             driver.close()
             self._lose("driver", "the driver process must not connect to the controller again by itself", driver)
-
-    def _forget(self, fileobj: object) -> None:
-        with suppress(KeyError, ValueError, OSError):
-            self._selector.unregister(fileobj)  # type: ignore[arg-type]
 
     def _end(self) -> None:
         """Stop the arm and see it stand."""

@@ -9,16 +9,13 @@ from __future__ import annotations
 import errno
 import os
 import re
-import select
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
+from coneskin.core.channel import wait_readable
 from coneskin.core.errors import MissingExtra, SkinConnectionError, SkinTimeout
-
-from .source import Source
 
 __all__ = ["PortFacts", "SerialPort", "find_ports", "list_ports"]
 
@@ -65,7 +62,7 @@ def list_ports() -> list[str]:
 _MAX_READ = 4096  # bytes in one read
 
 
-class SerialPort(Source):
+class SerialPort:
     """Source of bytes from a serial port.
 
     Args:
@@ -85,7 +82,13 @@ class SerialPort(Source):
         self.low_latency = False
         self._port: Any = None
         self._descriptor: int | None = None
-        self._wait: Callable[[float], bool] = bool  # set with the descriptor
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def open(self) -> None:
         """Open the port for this process alone, and throw away what had piled up in it.
@@ -113,7 +116,6 @@ class SerialPort(Source):
         self._descriptor = _descriptor(port)
         if self._descriptor is not None:
             os.set_blocking(self._descriptor, False)
-            self._wait = _waiter(self._descriptor)
 
     def close(self) -> None:
         """Close the port; it does not matter whether it is open or still there."""
@@ -146,7 +148,7 @@ class SerialPort(Source):
                 raise SkinConnectionError(f"{self.name} is gone: {error.strerror or error}") from error
             now = time.monotonic()
             deadline = deadline or now + timeout
-            waited = self._wait(deadline - now)
+            waited = bool(wait_readable([self._port], deadline - now))
             if not waited and time.monotonic() >= deadline:
                 raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
 
@@ -171,23 +173,6 @@ def _descriptor(port: Any) -> int | None:
         return int(port.fileno())
     except (AttributeError, OSError, ValueError):  # io.UnsupportedOperation is both
         return None
-
-
-def _waiter(descriptor: int) -> Callable[[float], bool]:
-    """Return a function that waits up to so many seconds for the descriptor to be readable."""
-    if hasattr(select, "epoll") or (hasattr(select, "poll") and sys.platform != "darwin"):
-        poll = select.poll()
-        poll.register(descriptor, select.POLLIN)
-
-        def wait_by_poll(timeout: float) -> bool:
-            return bool(poll.poll(-(-max(timeout, 0.0) * 1e3 // 1)))  # rounded up to whole milliseconds
-
-        return wait_by_poll
-
-    def wait_by_select(timeout: float) -> bool:  # macOS cannot poll terminals
-        return bool(select.select([descriptor], (), (), max(timeout, 0.0))[0])
-
-    return wait_by_select
 
 
 def _explain(url: str, error: Exception) -> str:

@@ -107,7 +107,7 @@ def test_the_guard_reports_a_touch_that_comes_through_it(i2c: None) -> None:
             now = 1e-3 * number  # [s], one packet a step
             loop.poll(0.0)
             for message in session.receive():
-                names += [decode_event(b).name for _, b in decode_blocks(message) if b.kind == BlockKind.EVENT]
+                names += [decode_event(b).name for b in decode_blocks(message) if b.kind == BlockKind.EVENT]
         loop._close()
     supervisor.close()
     session.close()

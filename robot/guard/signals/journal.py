@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.core.text import read_json
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
 
 if TYPE_CHECKING:
     from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StopProgram
-    from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
 
 __all__ = [
     "INPUTS",
@@ -40,6 +40,7 @@ __all__ = [
     "decode_loss",
     "describe_way",
     "emit",
+    "encode_command",
     "encode_loss",
     "force_block",
     "stopping_contact",
@@ -249,12 +250,29 @@ def describe_way(details: Mapping[str, Any], verb: str = "retreated") -> str:
     return f"went {went:.1f} mm on while it braked and then {went + progress:.1f} mm back"
 
 
+_OWN_NAMES = {JointVelocitySetpoint: "setpoint", SetpointProgram: "follow", SetSpeedSlider: "slider"}
 #: to the driver process, and over connections of the guard's own
 Command: TypeAlias = (
     "StopProgram | SetJointVelocity | EndReaction | Release"
     " | UseStopPath | SetpointProgram | JointVelocitySetpoint | SetSpeedSlider"
 )
 Output: TypeAlias = "Command | GuardEvent"
+
+
+def encode_command(output: Command, process: str, taken: bool = True) -> bytes:
+    """Return the payload of the block that records a command.
+
+    Args:
+        output: of a guard's core.
+        process: that takes what goes over no connection of the guard's own: "driver" or "watchdog".
+        taken: it was sent.
+    """
+    note = "" if taken else ", not sent"
+    if isinstance(output, UseStopPath):
+        return f"{output.path.value}\n{'sent' if taken else 'not sent'}".encode()
+    if isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
+        return f"{_OWN_NAMES[type(output)]}{note}\n{tuple(output)}".encode()
+    return f"{process}{note}\n".encode() + output.encode()
 
 
 class Outputs(Protocol):
@@ -279,7 +297,7 @@ class RecordingOverflowFilter:
     def shorten(self, message: bytes) -> bytes:
         """Return the events in a message. The rest of it is counted."""
         kept = []
-        for _, block in decode_blocks(message):
+        for block in decode_blocks(message):
             if block.kind == BlockKind.EVENT:
                 kept.append(encode_block(block))
                 continue

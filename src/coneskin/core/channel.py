@@ -51,7 +51,7 @@ _Waited = TypeVar("_Waited", bound=_HasDescriptor)
 def wait_readable(inputs: Sequence[_Waited], timeout: float) -> list[_Waited]:
     """Wait until one of these can be read or has ended, or for the timeout [s], and return those that can.
 
-    Unlike ``select.select`` it also takes descriptors above 1023, of which a program may have many.
+    Unlike ``select.select`` it also takes descriptors above 1023 on Linux, of which a program may have many.
     """
     return _wait(inputs, timeout, write=False)
 
@@ -62,7 +62,7 @@ def wait_writable(output: _HasDescriptor, timeout: float) -> bool:
 
 
 def _wait(items: Sequence[_Waited], timeout: float, write: bool) -> list[_Waited]:
-    if sys.platform == "win32":  # it has no poll, and no limit of this kind; written from the documentation
+    if sys.platform in ("win32", "darwin"):  # no poll, or none of terminals; written from the documentation
         if not items:
             time.sleep(timeout)
         readable, writable, _ = select.select([] if write else items, items if write else [], [], timeout)
@@ -108,7 +108,7 @@ class Channel:
         self.overflow: _OverflowFilter | None = None
         self._full = False
         self._sending = threading.Lock()
-        _open_channels.add(self)
+        _open_sockets.add(sock)
 
     def fileno(self) -> int:
         """Return the descriptor, for select and poll; -1 when closed."""
@@ -229,13 +229,13 @@ class Channel:
         self._sock.close()
 
 
-_open_channels: weakref.WeakSet[Channel] = weakref.WeakSet()
+_open_sockets: weakref.WeakSet[socket.socket] = weakref.WeakSet()
 
 
 def _close_in_forked_child() -> None:
     """Close the copies of all channels in a forked child: with them it would hide the death of its parent."""
-    for channel in list(_open_channels):
-        channel.close()
+    for sock in list(_open_sockets):
+        sock.close()
 
 
 if hasattr(os, "register_at_fork"):

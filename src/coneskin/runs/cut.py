@@ -21,11 +21,19 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import code_versions
 from coneskin.robot.driver.messages import Release, StatusReport
-from coneskin.robot.guard.signals.journal import INPUTS, BlockKind, Command, EventName, GuardEvent, Output
+from coneskin.robot.guard.signals.journal import (
+    INPUTS,
+    BlockKind,
+    Command,
+    EventName,
+    GuardEvent,
+    Output,
+    encode_command,
+)
 from coneskin.scene.settings import resolved_settings
 
 from .comparison import Comparison, compare_decisions
-from .decisions import SKIN_EVENTS, Decisions, command_block, decide_again, recorded_decisions
+from .decisions import SKIN_EVENTS, Decisions, decide_again, recorded_decisions
 from .replay.event_details import Tolerances
 
 if TYPE_CHECKING:
@@ -207,7 +215,7 @@ def _written(run: Run, since: float, until: float) -> list[Block]:
             if taken.kind in INPUTS:
                 core.feed(taken, outputs)
             commands = [output for output in outputs if not isinstance(output, GuardEvent)]
-            blocks += [command_block(command, taken.time, process) for command in commands]
+            blocks += [Block(BlockKind.COMMAND, taken.time, encode_command(command, process)) for command in commands]
             blocks += [output.block() for output in outputs if isinstance(output, GuardEvent)]
             queue += _acknowledgements(commands, taken.time)
             outputs.clear()

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
-from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, UseStopPath
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
     SESSION_EVENTS,
     BlockKind,
-    Command,
     EventName,
     GuardEvent,
+    encode_command,
 )
 
 from .replay.event_details import Tolerances
@@ -35,7 +34,6 @@ __all__ = [
     "SKIN_EVENTS",
     "Decisions",
     "EventPair",
-    "command_block",
     "decide_again",
     "first_divergence",
     "pair_events",
@@ -45,7 +43,6 @@ __all__ = [
 
 _NUMBER_PATTERN = re.compile(r"[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|inf|nan)")
 _SLIDER_WORD = "slider"
-_OWN_NAMES = {JointVelocitySetpoint: "setpoint", SetpointProgram: "follow", SetSpeedSlider: _SLIDER_WORD}
 _SPEED_COMMANDS = frozenset({"setpoint", SetJointVelocity.__name__})  # commands of joint speeds
 _ABSOLUTE_TOLERANCE = 1e-12  # rad/s and the like, for numbers near zero
 
@@ -80,32 +77,6 @@ class _ArmCommand(NamedTuple):
         )
 
 
-def _command_of(output: Command, time: float) -> _ArmCommand:
-    """Return the command that a guard's core puts out at a time [s]."""
-    if isinstance(output, UseStopPath):
-        return _ArmCommand(time, output.path.value, ())  # a recording does not tell with which deceleration
-    if isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
-        return _ArmCommand(time, _OWN_NAMES[type(output)], _numbers(str(tuple(output))))
-    return _of_message(time, output.encode())
-
-
-def command_block(output: Command, time: float, process: str) -> Block:
-    """Return the block that records a command as the guard's loop does.
-
-    Args:
-        output: of a guard's core.
-        time: host clock [s].
-        process: that takes what goes over no connection of the guard's own: "driver" or "watchdog".
-    """
-    if isinstance(output, UseStopPath):
-        payload = f"{output.path.value}\nsent".encode()
-    elif isinstance(output, JointVelocitySetpoint | SetpointProgram | SetSpeedSlider):
-        payload = f"{_OWN_NAMES[type(output)]}\n{tuple(output)}".encode()
-    else:
-        payload = process.encode() + b"\n" + output.encode()
-    return Block(BlockKind.COMMAND, time, payload)
-
-
 def recorded_commands(blocks: Iterable[Block]) -> Iterator[_ArmCommand]:
     """Yield the commands of a recording, each with the time of the input before it."""
     time = math.nan
@@ -113,14 +84,18 @@ def recorded_commands(blocks: Iterable[Block]) -> Iterator[_ArmCommand]:
         if block.kind in INPUTS:
             time = block.time
         elif block.kind == BlockKind.COMMAND:
-            head, _, body = block.payload.partition(b"\n")
-            name = head.decode("utf-8", "replace").removesuffix(", not sent")
-            if body in (b"sent", b"not sent"):
-                yield _ArmCommand(time, name, ())
-            elif name in ("driver", "watchdog"):
-                yield _of_message(time, body)
-            else:
-                yield _ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
+            yield _command_in(block.payload, time)
+
+
+def _command_in(payload: bytes, time: float) -> _ArmCommand:
+    """Return the command in a block's payload, for an input of a host time [s]."""
+    head, _, body = payload.partition(b"\n")
+    name = head.decode("utf-8", "replace").removesuffix(", not sent")
+    if body in (b"sent", b"not sent"):  # with which deceleration, a recording does not tell
+        return _ArmCommand(time, name, ())
+    if name in ("driver", "watchdog"):
+        return _of_message(time, body)
+    return _ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
 
 
 def first_divergence(
@@ -147,7 +122,7 @@ def _of_message(time: float, message: bytes) -> _ArmCommand:
         command = decode_command(message)
     except ValueError:
         return _ArmCommand(time, repr(message), ())
-    return _ArmCommand(time, type(command).__name__, _numbers(str(tuple(command))))
+    return _ArmCommand(time, type(command).__name__, _numbers(repr(command)))
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -276,7 +251,7 @@ def decide_again(
             if isinstance(output, GuardEvent):
                 events.append(output)
             else:
-                commands.append(_command_of(output, block.time))
+                commands.append(_command_in(encode_command(output, "driver"), block.time))
     label = label or ", ".join(f"{name} = {value}" for name, value in (settings or {}).items()) or "replayed"
     return replace(_decisions(run, label, tuple(events), tuple(commands)), other_code=run.other_code())
 

@@ -93,7 +93,7 @@ class EventLog:
     def feed(self, data: bytes) -> None:
         """Take encoded blocks from the guard; whatever they are, the log goes on."""
         try:
-            self._write([block for _, block in decode_blocks(data)])
+            self._write(decode_blocks(data))
         except Exception as exc:
             logging.getLogger("coneskin").exception("a report of the guard is lost")
             self.report(EventName.MESSAGE, what=f"a report of the guard is lost: {type(exc).__name__}: {exc}")

@@ -110,7 +110,7 @@ def test_a_skin_is_waited_for_only_where_no_descriptor_tells_that_it_has_bytes(e
 def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
     taken = dict.fromkeys(("use.return_value", "follow.return_value", "write.return_value", "set.return_value"), True)
     stops, setpoints, slider = Mock(**taken), Mock(**taken), Mock(**taken)
-    outbox = _Outbox(GuardPorts(ends[0], None, stops=stops, setpoints=setpoints, slider=slider))
+    outbox = _Outbox(GuardPorts(ends[0], None, stops=stops, setpoints=setpoints, slider=slider), lambda: 1.0)
     speeds, program = JointVelocitySetpoint(7, (0.1,) * 6, 4.0), SetpointProgram(7, 9.0, 20.0)
     for output in (UseStopPath(StopPath.COMMAND, 5.0), UseStopPath(StopPath.SLIDER, 5.0), speeds, program):
         outbox.append(output)
@@ -118,7 +118,7 @@ def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
     assert stops.mock_calls == [call.use(StopPath.COMMAND, 5.0), call.follow(program)]
     assert setpoints.mock_calls == [call.write(speeds)]
     assert slider.mock_calls == [call.set(0.0), call.set(0.25)]
-    names = [said.partition(b"\n")[0].decode() for said in outbox.sent]
+    names = [block.payload.partition(b"\n")[0].decode() for block in outbox.sent]
     assert names == ["command", "slider", "setpoint", "follow", "slider"]
 
 
@@ -133,5 +133,5 @@ def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):
     while not ours.finish(0.0):
         read += b"".join(theirs.receive())
     read += b"".join(theirs.receive())
-    blocks = [block for _, block in decode_blocks(read)]
+    blocks = decode_blocks(read)
     assert b"not recorded" in blocks[-1].payload

@@ -17,10 +17,10 @@ def with_a_gap(whole, cut, since, until):
     spill, blocks = RecordingOverflowFilter(), []
     for block in read_recording(whole):
         if block.kind == BlockKind.HEADER or not since <= block.time < until:
-            blocks += [found for _, found in decode_blocks(spill.notice())]
+            blocks += decode_blocks(spill.notice())
             blocks.append(block)
         else:
-            blocks += [found for _, found in decode_blocks(spill.shorten(encode_block(block)))]
+            blocks += decode_blocks(spill.shorten(encode_block(block)))
     with Recorder(cut) as recorder:
         recorder.write(*blocks)
 

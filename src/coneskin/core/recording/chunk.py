@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from coneskin.core.errors import RecordingError
 
-from .block import MAX_PAYLOAD, Block, is_time
+from .block import MAX_PAYLOAD, Block, decode_blocks, encode_block, is_time
 
 __all__ = [
     "CHUNK_HEAD_SIZE",
@@ -31,7 +31,6 @@ MAGIC = b"CONESKIN"  #: of a file
 SYNC = b"\xa7CSK"  #: of a chunk
 _FILE_HEAD = struct.Struct("<8sIQI")
 _CHUNK_HEAD = struct.Struct("<4sIQQIIQddB3xII")
-_BLOCK_HEAD = struct.Struct("<IBd")
 FILE_HEAD_SIZE = _FILE_HEAD.size  #: bytes
 CHUNK_HEAD_SIZE = _CHUNK_HEAD.size  #: bytes
 MAX_BODY = 2 * MAX_PAYLOAD  #: bytes of a chunk's blocks before compression; more is damage, not data
@@ -100,7 +99,7 @@ def decode_file_head(data: bytes) -> int | None:
 
 def encode_chunk(run: int, sequence: int, blocks: Sequence[Block], span: int = 1) -> bytes:
     """Return the bytes of a chunk of at least one block, compressed where that makes it smaller."""
-    body = b"".join([_BLOCK_HEAD.pack(len(payload), kind, time) + payload for kind, time, payload in blocks])
+    body = b"".join(map(encode_block, blocks))
     packed = zlib.compress(body, _ZLIB_LEVEL)
     encoding, stored = (_ZLIB, packed) if len(packed) < len(body) else (_PLAIN, body)
     times = [block.time for block in blocks]
@@ -130,22 +129,14 @@ def decode_body(head: ChunkHead, stored: bytes) -> list[Block]:
         RecordingError: the body is not what its head says: it was made so, not damaged.
     """
     body = _unpacked(head, stored)
-    at, size, since, until = 0, len(body), head.since, head.until
-    unpack, skip, make = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size, tuple.__new__
-    blocks: list[Block] = []
-    put, longest = blocks.append, MAX_PAYLOAD
     try:
-        while at < size:
-            length, kind, time = unpack(body, at)
-            start = at + skip
-            at = start + length
-            if at > size or length > longest:
-                raise _wrong(head, f"a block has {length} bytes")
-            if not since <= time <= until:
-                raise _wrong(head, f"a block of it has the time {time} s")
-            put(make(Block, (kind, time, body[start:at])))  # half the time of Block(...)
-    except struct.error:
-        raise _wrong(head, f"{size - at} bytes are left behind its last block") from None
+        blocks = decode_blocks(body)
+    except RecordingError as exc:
+        raise _wrong(head, str(exc)) from None
+    since, until = head.since, head.until
+    for _, time, _ in blocks:
+        if not since <= time <= until:
+            raise _wrong(head, f"a block of it has the time {time} s")
     return blocks
 
 

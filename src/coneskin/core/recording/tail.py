@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -11,22 +12,12 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
 
 from .block import END, Block
-from .chunk import (
-    CHUNK_HEAD_SIZE,
-    FILE_HEAD_SIZE,
-    SYNC,
-    ChunkHead,
-    bits,
-    decode_body,
-    decode_chunk_head,
-    decode_file_head,
-)
+from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head
 from .reader import MAX_SIZE
 from .recorder import part_path
+from .scan import Chunk, walk
 
 __all__ = ["RecordingTail"]
-
-_SEARCH_SIZE = 1 << 16  # bytes that are looked at together for the next chunk, where one is damaged
 
 
 class RecordingTail:
@@ -51,32 +42,29 @@ class RecordingTail:
         self.damaged = 0
         self._keep, self._always = keep, bits(always)
         self._part, self._offset = 0, FILE_HEAD_SIZE
-        self._file = self._open(0)
-        if decode_file_head(self._file.read(FILE_HEAD_SIZE)) is None:
-            self._file.close()
+        file = self._open(0)
+        if file is None:
+            raise RecordingError(f"cannot read the recording {path}: it is not there, or is no ordinary file")
+        self._file = file
+        if decode_file_head(file.read(FILE_HEAD_SIZE)) is None:
+            file.close()
             raise RecordingError(f"{path} is no recording that can be followed; look at it with: coneskin runs info")
 
     def read(self) -> list[Block]:
         """Return the blocks that have come since the last call; it does not wait for any.
 
         Raises:
-            RecordingError: the file is gone, or an intact chunk holds what cannot be.
+            RecordingError: an intact chunk holds what cannot be.
         """
-        found: list[Block] = []
-        chunks = list(self._chunks())
-        newest = max((head.until for _, _, head in chunks), default=0.0)
-        for part, offset, head in chunks:
-            if head.until < newest - self._keep and not head.kinds & self._always:
-                continue
-            file = self._file if part == self._part else self._open(part)
-            try:
-                file.seek(offset)
-                stored = file.read(head.length)
-            finally:
-                if file is not self._file:
-                    file.close()
-            if len(stored) == head.length:
-                found += decode_body(head, stored)
+        recent, always = deque[Chunk](), list[Chunk]()
+        newest = 0.0
+        for chunk in self._chunks():
+            newest = max(newest, chunk.head.until)
+            (always if chunk.head.kinds & self._always else recent).append(chunk)
+            while recent and recent[0].head.until < newest - self._keep:
+                recent.popleft()
+        kept = sorted([*always, *recent], key=lambda chunk: chunk.head.sequence)
+        found = [block for chunk in kept for block in decode_body(chunk.head, chunk.stored)]
         self.ended = self.ended or any(block.kind == END for block in found)
         return found
 
@@ -84,45 +72,25 @@ class RecordingTail:
         """Close the file; may be called again."""
         self._file.close()
 
-    def _chunks(self) -> Iterator[tuple[int, int, ChunkHead]]:
-        """Yield part, offset of the body, and head of each chunk that is whole."""
+    def _chunks(self) -> Iterator[Chunk]:
+        """Yield each chunk that is whole."""
         while True:
+            following = self._open(self._part + 1)  # before the size is asked for: then the one before is finished
             size = self._file.seek(0, 2)
-            while self._offset + CHUNK_HEAD_SIZE <= size:
-                self._file.seek(self._offset)
-                head = decode_chunk_head(self._file.read(CHUNK_HEAD_SIZE))
-                if head is None:
-                    self._pass_over(size)
-                    continue
-                end = self._offset + CHUNK_HEAD_SIZE + head.length
-                if end > size:
-                    break
-                yield self._part, end - head.length, head
-                self._offset = end
-            if not self._next_part():
+            for piece in walk(self._file, self._offset, size):
+                if isinstance(piece, Chunk):
+                    self._offset = piece.end
+                    yield piece
+                elif piece.end < size or following is not None:
+                    self._offset = piece.end
+                    self.damaged += piece.end - piece.offset
+                # else it may be a chunk that is not whole yet
+            if following is None:
                 return
+            self._file.close()
+            self._file, self._part, self._offset = following, self._part + 1, FILE_HEAD_SIZE
 
-    def _next_part(self) -> bool:
-        """Go on in the next file, where there is one: the one before is finished then."""
-        try:
-            file = open_file(part_path(self.path, self._part + 1), MAX_SIZE)
-        except OSError:
-            return False
-        self._file.close()
-        self._file, self._part, self._offset = file, self._part + 1, FILE_HEAD_SIZE
-        return True
-
-    def _pass_over(self, size: int) -> None:
-        """Go on at the next head of a chunk behind damaged bytes."""
-        begin = self._offset
-        self._file.seek(begin + 1)
-        window = self._file.read(min(_SEARCH_SIZE, size - begin - 1))
-        found = window.find(SYNC)
-        self._offset = begin + 1 + found if found >= 0 else max(begin + 1, begin + 1 + len(window) - len(SYNC) + 1)
-        self.damaged += self._offset - begin
-
-    def _open(self, part: int) -> BinaryIO:
-        path = part_path(self.path, part)
+    def _open(self, part: int) -> BinaryIO | None:
         with suppress(OSError):
-            return open_file(path, MAX_SIZE)
-        raise RecordingError(f"cannot read the recording {path}: it is not there, or is no ordinary file")
+            return open_file(part_path(self.path, part), MAX_SIZE)
+        return None

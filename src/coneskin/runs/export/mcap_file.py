@@ -1,6 +1,7 @@
 """MCAP file of a run, which Foxglove draws: events as a log, joints and touch level as plots, the arm as a 3D scene.
 
-The messages are JSON with the schemas of Foxglove (foxglove.Log, foxglove.SceneUpdate) and two of our own for plots.
+The messages are JSON in the shapes of Foxglove (foxglove.Log, foxglove.SceneUpdate) and four of our own for plots. A
+schema is made of a message of its kind.
 
 Source: the message schemas of Foxglove, https://docs.foxglove.dev/docs/sdk/schemas (Log, SceneUpdate).
 """
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from heapq import merge
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,83 +32,7 @@ if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["SCHEMAS", "write_mcap"]
-
-_Schema = dict[str, Any]
-
-
-def _object(title: str = "", **properties: _Schema) -> _Schema:
-    named = {"title": title} if title else {}
-    return {**named, "type": "object", "properties": properties, "required": list(properties)}
-
-
-def _list(items: _Schema) -> _Schema:
-    return {"type": "array", "items": items}
-
-
-_TEXT, _NUMBER, _WHOLE, _FLAG = ({"type": name} for name in ("string", "number", "integer", "boolean"))
-_UNSIGNED_TYPE = {"type": "integer", "minimum": 0}
-_NANOSECONDS_TYPE = {"type": "integer", "minimum": 0, "maximum": 999_999_999}
-_TIME_TYPE = _object("time", sec=_UNSIGNED_TYPE, nsec=_NANOSECONDS_TYPE)
-_DURATION_TYPE = _object("duration", sec=_WHOLE, nsec=_NANOSECONDS_TYPE)
-_VECTOR_TYPE = _object("foxglove.Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_POINT_TYPE = _object("foxglove.Point3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_QUATERNION_TYPE = _object("foxglove.Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE_TYPE = _object("foxglove.Pose", position=_VECTOR_TYPE, orientation=_QUATERNION_TYPE)
-_COLOR_TYPE = _object("foxglove.Color", r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_LINE_TYPE = _object(
-    "foxglove.LinePrimitive",
-    type={"enum": [0, 1, 2]},
-    pose=_POSE_TYPE,
-    thickness=_NUMBER,
-    scale_invariant=_FLAG,
-    points=_list(_POINT_TYPE),
-    color=_COLOR_TYPE,
-    colors=_list(_COLOR_TYPE),
-    indices=_list(_UNSIGNED_TYPE),
-)
-_SPHERE_TYPE = _object("foxglove.SpherePrimitive", pose=_POSE_TYPE, size=_VECTOR_TYPE, color=_COLOR_TYPE)
-_UNUSED_LIST = _list({"type": "object"})
-_ENTITY_TYPE = _object(
-    "foxglove.SceneEntity",
-    timestamp=_TIME_TYPE,
-    frame_id=_TEXT,
-    id=_TEXT,
-    lifetime=_DURATION_TYPE,
-    frame_locked=_FLAG,
-    metadata=_list(_object("foxglove.KeyValuePair", key=_TEXT, value=_TEXT)),
-    arrows=_UNUSED_LIST,
-    cubes=_UNUSED_LIST,
-    spheres=_list(_SPHERE_TYPE),
-    cylinders=_UNUSED_LIST,
-    lines=_list(_LINE_TYPE),
-    triangles=_UNUSED_LIST,
-    texts=_UNUSED_LIST,
-    models=_UNUSED_LIST,
-)
-_LOG_SCHEMA = _object(
-    "foxglove.Log",
-    timestamp=_TIME_TYPE,
-    level={"enum": [0, 1, 2, 3, 4, 5]},
-    message=_TEXT,
-    name=_TEXT,
-    file=_TEXT,
-    line=_UNSIGNED_TYPE,
-)
-_JOINT_FIELDS = {
-    f"{name}{joint}_{unit}": _NUMBER for name, unit in (("q", "rad"), ("qd", "rad_s")) for joint in range(1, 7)
-}
-
-#: name -> JSON schema
-SCHEMAS: Mapping[str, _Schema] = {
-    "foxglove.Log": _LOG_SCHEMA,
-    "foxglove.SceneUpdate": _object("foxglove.SceneUpdate", deletions=_UNUSED_LIST, entities=_list(_ENTITY_TYPE)),
-    "coneskin.ArmState": _object("coneskin.ArmState", **_JOINT_FIELDS),
-    "coneskin.SpeedSlider": _object("coneskin.SpeedSlider", fraction=_NUMBER),
-    "coneskin.Command": _object("coneskin.Command", command=_TEXT, numbers=_list(_NUMBER)),
-    "coneskin.TouchLevel": _object("coneskin.TouchLevel", sensor=_TEXT, level=_NUMBER, clock_us=_UNSIGNED_TYPE),
-}
-
+__all__ = ["write_mcap"]
 
 _STATE_WINDOW = 1.0  # s between a contact and the state of the arm in which it is drawn
 _DRAWN_EVERY = 0.02  # s between two drawings of the arm
@@ -151,8 +76,9 @@ def write_mcap(run: Run, path: Path, progress: Progress = silent) -> int:
         for number, message in enumerate(messages):
             if message.topic not in channels:
                 if message.schema not in schemas:
+                    schema = {"title": message.schema, **_schema_of(_examples().get(message.schema, message.value))}
                     schemas[message.schema] = writer.register_schema(
-                        message.schema, "jsonschema", json.dumps(SCHEMAS[message.schema]).encode()
+                        message.schema, "jsonschema", json.dumps(schema).encode()
                     )
                 channels[message.topic] = writer.register_channel(message.topic, "json", schemas[message.schema])
             stamp = round(1e9 * (message.time + unix))
@@ -262,6 +188,25 @@ def _rings(item: SensorOnArm, arm: Any, state: ControllerState) -> list[dict[str
         points = [base_link.apply(item.frustum.point(u * frustum.slant, frustum.wrap * k / 24)) for k in range(25)]
         rings.append(_line(points, (0.1, 0.6, 0.2), 0.004))
     return rings
+
+
+_JSON_TYPES = {str: "string", bool: "boolean", int: "integer", float: "number"}
+
+
+def _examples() -> dict[str, dict[str, Any]]:
+    """Return messages whose lists hold something, of the kinds that have lists: schema -> value."""
+    point = (0.0, 0.0, 0.0)
+    drawn = _update("", 0.0, [_line([point], point, 0.0)], [_sphere(point)])
+    return {"foxglove.SceneUpdate": drawn, "coneskin.Command": {"command": "", "numbers": [0.0]}}
+
+
+def _schema_of(value: Any) -> dict[str, Any]:
+    """Return the JSON schema of a message: each of its kind has the same keys. What a list never holds is an object."""
+    if isinstance(value, dict):
+        return {"type": "object", "properties": {k: _schema_of(v) for k, v in value.items()}, "required": list(value)}
+    if isinstance(value, list):
+        return {"type": "array", "items": _schema_of(value[0] if value else {})}
+    return {"type": _JSON_TYPES[type(value)]}
 
 
 def _stamp(unix: float) -> dict[str, int]:
