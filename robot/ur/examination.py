@@ -9,7 +9,6 @@ lower half of the registers, which is the half of ur_rtde.
 
 from __future__ import annotations
 
-import socket
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -26,12 +25,11 @@ from .model_check import check_model, read_pose
 from .rtde_codec import decode_state
 from .rtde_connection import PORT, RtdeConnection
 from .state_reader import StateReader
-from .stop_sockets import StopSockets, refuse_polyscope_x
+from .stop_sockets import StopSockets
 
 __all__ = ["examine"]
 
 _REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
-_DASHBOARD_PORT, _SCRIPT_PORT = 29999, 30003  # TCP ports
 _LISTEN_TIME = 1.0  # s of states
 _MAX_LATENESS, _MAX_GAP = 1.25, 0.025  # times the control cycle, of the median between two states; s, of the longest
 _CB3_MAJOR = 3  # major version of its software, which has a cycle of 8 ms and no local control
@@ -52,22 +50,16 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
     try:
         with RtdeConnection(host, _REPLY_TIMEOUT) as connection:
             major, minor = connection.ask_version()
-        found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers, software {major}.{minor}")]
-        refuse_polyscope_x(host, _REPLY_TIMEOUT)
-    except RobotRefused as exc:
-        return [*found, Finding("arm, dashboard", "bad", str(exc))]
     except ConeSkinError as exc:
-        rest = ("model", "state", "registers", "latency", "dashboard")
+        rest = ("model", "state", "registers", "latency", "stops")
         return [
             Finding("arm, RTDE", "bad", str(exc), f"{host}:{PORT} answers", "for a simulated one: coneskin sim-ur"),
             *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
         ]
+    found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers, software {major}.{minor}")]
     found += _tried("arm, model", lambda: _model(arm, host))
     found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3_MAJOR else 0.002)))
-    found += _dashboard(host, major)
-    found += _port("arm, script port", host, _SCRIPT_PORT)
-    if not any(finding.verdict == "bad" for finding in found[-3:]):
-        found += _tried("arm, stops", lambda: _stops(host))
+    found += _tried("arm, stops", lambda: _stops(host))
     found += list(_registers(host, scope))
     return found
 
@@ -129,40 +121,6 @@ def _state(host: str, cycle: float) -> Iterator[Finding]:
     remedy = "" if verdict == "ok" else "a cable of its own, no wireless network, a quieter computer"
     value = f"a state each {1e3 * middle:.2f} ms (median), the longest gap {1e3 * longest:.1f} ms"
     yield Finding("arm, latency", verdict, value, f"{1e3 * _MAX_LATENESS * cycle:g} ms, {1e3 * _MAX_GAP:g} ms", remedy)
-
-
-def _port(item: str, host: str, port: int) -> list[Finding]:
-    try:
-        socket.create_connection((host, port), _REPLY_TIMEOUT).close()
-    except OSError as exc:
-        why = f"{host}:{port}: {exc.strerror or exc}"
-        return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
-    return [Finding(item, "ok", f"{host}:{port} answers")]
-
-
-def _dashboard(host: str, major: int) -> list[Finding]:
-    """Ask the dashboard for the version and whether the controller is in remote control."""
-    item = "arm, dashboard"
-    try:
-        with socket.create_connection((host, _DASHBOARD_PORT), _REPLY_TIMEOUT) as sock:
-            lines = sock.makefile("rw", encoding="utf-8", newline="\n")
-            lines.readline()  # the welcome
-            answers = []
-            for question in ("PolyscopeVersion", "is in remote control"):
-                lines.write(question + "\n")
-                lines.flush()
-                answers.append(lines.readline().strip())
-    except OSError as exc:
-        why = f"{host}:{_DASHBOARD_PORT}: {exc.strerror or exc}"
-        return [Finding(item, "bad", why, "it answers", "enable it: Settings, Security, Services")]
-    version, remote = answers
-    found = [Finding(item, "ok", version or "it answers")]
-    if major == _CB3_MAJOR:
-        return found
-    if "true" in remote.lower():
-        return [*found, Finding("arm, remote control", "ok", "it is in remote control")]
-    remedy = "choose Remote Control at the top right of the pendant"
-    return [*found, Finding("arm, remote control", "bad", f"it answers {remote!r}", "remote control", remedy)]
 
 
 def _registers(host: str, scope: ExaminationScope) -> Iterator[Finding]:

@@ -32,7 +32,7 @@ from coneskin.robot.driver.values import SetpointProgram, StopPath
 
 from .rtde_connection import RtdeConnection
 
-__all__ = ["StopSockets", "refuse_polyscope_x"]
+__all__ = ["StopSockets"]
 
 _REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
@@ -58,22 +58,6 @@ _FIRST_X = 10  # major version of PolyScope X
 _STOP_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
 
 
-def refuse_polyscope_x(host: str, timeout: float) -> None:
-    """Refuse a controller with PolyScope X.
-
-    Raises:
-        RobotRefused: it has that.
-        RobotConnectionError, RobotTimeout: it does not say what it has.
-    """
-    with RtdeConnection(host, timeout) as connection:
-        major, minor = connection.ask_version()
-    if major >= _FIRST_X:
-        raise RobotRefused(
-            f"the controller {host} has PolyScope X ({major}.{minor}), which has no dashboard server to stop an arm "
-            "with: coneskin does not support it. It guards arms with PolyScope 3 and 5"
-        )
-
-
 class StopSockets:
     """Two sockets and the three stops that go through them; open it in a ``with``.
 
@@ -95,7 +79,7 @@ class StopSockets:
 
     def __enter__(self) -> StopSockets:
         try:
-            refuse_polyscope_x(self.host, self._timeout)
+            self._refuse_polyscope_x()
             for name, port in _STOP_PORTS.items():
                 self._open_ones[name] = self._open(port)
             self._prove_remote(self._open_ones["command"])
@@ -170,6 +154,15 @@ class StopSockets:
             )
         if answers[1].lower() == b"false":
             raise RobotRefused(f"the controller {self.host} {_LOCAL_CONTROL}")
+
+    def _refuse_polyscope_x(self) -> None:
+        with RtdeConnection(self.host, self._timeout) as connection:
+            major, minor = connection.ask_version()
+        if major >= _FIRST_X:
+            raise RobotRefused(
+                f"the controller {self.host} has PolyScope X ({major}.{minor}), which has no dashboard server to stop "
+                "an arm with: coneskin does not support it. It guards arms with PolyScope 3 and 5"
+            )
 
     def _prove_program(self) -> None:
         """Send a secondary program that writes a register, and see it written: it runs beside any other."""
@@ -253,6 +246,7 @@ class StopSockets:
         except OSError as exc:
             raise RobotConnectionError(
                 f"cannot reach port {port} of the controller {self.host}, which a stop may need: {exc.strerror or exc}"
+                "; enable it: Settings, Security, Services"
             ) from exc
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setblocking(False)

@@ -21,7 +21,7 @@ from typing import Protocol
 
 from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 
@@ -212,26 +212,14 @@ class SimulatedArm:
             rate: that is asked for; 0 for the controller's own. It is less where the motors cannot do it.
         """
         if self._feasible_for <= 0 and any(self.qd):
-            self._feasible, self._feasible_for = self.feasible_braking(), _BRAKING_CYCLES
+            lead = max_abs(self.qd)
+            most = self.feasible_acceleration([-speed / lead for speed in self.qd])
+            self._feasible, self._feasible_for = min(max(most, _WEAKEST_BRAKING), _HARDEST_BRAKING), _BRAKING_CYCLES
         self._feasible_for -= 1
         if not self.category_0:
             return min(rate or self.deceleration, self._feasible)
         share = max_abs([speed / highest for speed, highest in zip(self.qd, self.model.joint_speed, strict=True)])
         return self._feasible * math.pow(min(1.0, max(share, _LEAST_SHARE)), _FADING_POWER)
-
-    def feasible_braking(self) -> float:
-        """Return how hard the arm can brake in proportion, by its motors' torques: of the leading joint [rad/s^2]."""
-        lead = max_abs(self.qd)
-        back = [-speed / lead for speed in self.qd]
-        still = joint_torques(self.model, self.inertia, self.q, self.qd, ZERO_VELOCITY)
-        braking = joint_torques(self.model, self.inertia, self.q, self.qd, back)
-        found = _HARDEST_BRAKING
-        for speed, limit, torque, with_it in zip(self.qd, self.inertia.torque, still, braking, strict=True):
-            slope = with_it - torque
-            most = limit if speed else _HELD_SHARE * limit
-            if slope:
-                found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
-        return max(found, _WEAKEST_BRAKING)
 
     def put(self, q: Sequence[float]) -> None:
         """Put an arm that stands at joint positions [rad], without a motion."""
@@ -289,11 +277,14 @@ class SimulatedArm:
         Args:
             direction: of the six joints; where the greatest of them is 1, the result is in rad/s^2.
         """
-        still = joint_torques(self.model, self.inertia, self.q, ZERO_VELOCITY, ZERO_VELOCITY)
-        rows = mass_matrix(self.model, self.inertia, self.q)
-        needed = [abs(sum(m * d for m, d in zip(row, direction, strict=True))) for row in rows]
-        left = [limit - abs(torque) for limit, torque in zip(self.inertia.torque, still, strict=True)]
-        return min((a / b for a, b in zip(left, needed, strict=True) if b > 0.0), default=MAX_ACCELERATION)
+        still = joint_torques(self.model, self.inertia, self.q, self.qd, ZERO_VELOCITY)
+        moved = joint_torques(self.model, self.inertia, self.q, self.qd, direction)
+        found = MAX_ACCELERATION
+        for along, limit, torque, with_it in zip(direction, self.inertia.torque, still, moved, strict=True):
+            most, slope = limit if along else _HELD_SHARE * limit, with_it - torque
+            if slope:
+                found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
+        return found
 
     # tool
 

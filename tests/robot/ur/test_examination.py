@@ -29,7 +29,7 @@ def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
     with served() as simulated:
         found = examine(arm_model("UR5e"), simulated.host, ALL)
         assert {name for name, verdict in verdicts(found).items() if verdict not in ("ok", "warning")} == set()
-        assert verdicts(found).keys() >= {"RTDE", "model", "power", "safety", "dashboard", "remote control", "latency"}
+        assert verdicts(found).keys() >= {"RTDE", "model", "power", "safety", "stops", "latency"}
         held = ["input_int_register_0", "speed_slider_mask", "speed_slider_fraction"]
         with RtdeConnection(simulated.host) as other:
             other.ask_inputs(held)
@@ -39,3 +39,6 @@ def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
         assert "UR5e" in bad["arm, model"].value
         assert "disable EtherNet/IP" in bad["arm, ur_rtde's registers"].remedy
         assert verdicts(again)["the setpoints' registers"] == "not tried"
+        simulated.call("local control")
+        last = {one.item: one for one in examine(arm_model("UR5e"), simulated.host, ALL)}["arm, stops"]
+        assert (last.verdict, "Choose Remote Control" in last.value) == ("bad", True)

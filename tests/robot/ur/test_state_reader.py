@@ -164,7 +164,7 @@ def test_a_dashboard_that_answers_nothing_proves_no_stop(monkeypatch, answer):
     with ours, theirs:
         theirs.sendall(answer)
         monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
-        monkeypatch.setattr("coneskin.robot.ur.stop_sockets.refuse_polyscope_x", lambda *_: None)
+        monkeypatch.setattr(StopSockets, "_refuse_polyscope_x", lambda _: None)
         with pytest.raises(RobotConnectionError, match="does not answer within"), StopSockets("127.0.0.1", 0.05):
             pass
 
@@ -174,7 +174,7 @@ def test_software_that_knows_no_local_control_is_taken(monkeypatch):
     with ours, theirs:
         theirs.sendall(b"Connected: Universal Robots Dashboard Server\ncould not understand: 'is in remote control'\n")
         monkeypatch.setattr(StopSockets, "_open", lambda *_: ours)
-        monkeypatch.setattr("coneskin.robot.ur.stop_sockets.refuse_polyscope_x", lambda *_: None)
+        monkeypatch.setattr(StopSockets, "_refuse_polyscope_x", lambda _: None)
         monkeypatch.setattr(StopSockets, "_prove_program", lambda _: None)
         with StopSockets("127.0.0.1", PATIENCE) as stops:
             assert list(stops.sockets()) == ["program", "command"]
