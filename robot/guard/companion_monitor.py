@@ -125,6 +125,7 @@ class CompanionMonitor:
         self._heartbeats = _Heartbeats(silences)
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
+        self._restarted_at = -math.inf
         self._restart_end = math.inf  # by when it has to run again, after an announced end
 
     @property
@@ -175,13 +176,23 @@ class CompanionMonitor:
         it again gives it no more time.
         """
         self._restart_end = math.inf if over else min(self._restart_end, now + _RESTART_TIMEOUT)
-        self._ran = not over  # states from before the start may still come
+        self._ran = not over
+        if over:
+            self._restarted_at = now
 
-    def program_ended(self, now: float, running: bool) -> str:
+    def program_ended(self, now: float, measured_at: float, running: bool) -> str:
         """Take whether a program runs on the controller, and return what is wrong. Empty where nothing is.
 
-        The end of the driver's program may be the only sign that the driver process hangs.
+        The end of the driver's program may be the only sign that the driver process hangs. A guard that was held up
+        reads states from before a restart after the report that it is over: they show nothing.
+
+        Args:
+            now: host time [s].
+            measured_at: host time at which it was measured [s].
+            running: a program runs.
         """
+        if measured_at < self._restarted_at:
+            return ""
         if self._arm is None or not self._arm.internal_control or not self._arm.phase.watched:
             self._ran, self._restart_end = False, math.inf
         elif running and now >= self._restart_end:  # it was refused, and the old one goes on

@@ -306,7 +306,7 @@ class GuardCore:
             self._add_fault(now, "the controller's own safety system has stopped the arm", out)
         elif not state.powered and arm.phase.watched:
             self._add_fault(now, "the arm is not powered any more, or its brakes are closed", out)
-        if ended := self._companions.program_ended(now, state.program_running):
+        if ended := self._companions.program_ended(now, arm.state_age.measured_at, state.program_running):
             self._add_fault(now, ended, out)
         heartbeat = arm.heartbeat  # does the program end by itself where no packet reaches the controller?
         if heartbeat is None:

@@ -275,7 +275,9 @@ class GuardLoop:
             ready &= ~_READER
         if ports.source is not None and (ready & _SKIN or self._blind):
             self._read_skin(ports.source)
-        if ready & _DRIVER:  # before the states: they show what was announced here
+        # read before what announces the ends of a program that they show, and fed after it
+        states = self._payloads(ports.reader, "controller") if ready & _READER else []
+        if states or ready & _DRIVER:
             self._read_channel(ports.driver, "driver")
         if ready & _WATCHDOG:
             self._read_channel(ports.watchdog, "watchdog")
@@ -283,8 +285,8 @@ class GuardLoop:
             ports.second.receive()
             if ports.second.closed:
                 self._lose("second", "the second guard watchdog has ended", ports.second)
-        if ready & _READER:
-            self._read(ports.reader, "controller", BlockKind.ARM)
+        for state in states:
+            self._feed(BlockKind.ARM, state)
         if ready & _SLIDER:
             self._read(ports.slider, "slider", BlockKind.SLIDER)
         if ready & _HEARTBEAT:
@@ -334,8 +336,8 @@ class GuardLoop:
     def _read_channel(self, channel: Channel | None, name: str) -> None:
         if channel is None:  # lost in this round
             return
-        self._helper_heard = self._clock()
         for message in channel.receive():
+            self._helper_heard = self._clock()
             self._feed(BlockKind.DRIVER, message)
         if channel.closed:
             what = "the driver process" if name == "driver" else "the guard watchdog"
@@ -384,14 +386,17 @@ class GuardLoop:
                 self._feed(BlockKind.LOST, encode_loss("skin", why))
 
     def _read(self, reader: PayloadReader | None, what: str, kind: BlockKind) -> None:
-        """Feed what has come over a connection of the controller, unless it was lost in this round."""
-        if reader is None:
-            return
+        """Feed what has come over a connection of the controller."""
+        for payload in self._payloads(reader, what):
+            self._feed(kind, payload)
+
+    def _payloads(self, reader: PayloadReader | None, what: str) -> list[bytes]:
+        """Return what has come over a connection of the controller, unless it was lost in this round."""
         try:
-            for payload in reader.read():
-                self._feed(kind, payload)
+            return [] if reader is None else reader.read()
         except ConeSkinError as exc:
             self._lose(what, str(exc), reader)
+            return []
 
     def _drain(self, stops: StopConnections) -> None:
         for name, sock, why in stops.drain():

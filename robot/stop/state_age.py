@@ -35,11 +35,13 @@ class StateAge:
     Attributes:
         fresh: True where the newest state was a new one.
         fresh_at: host time of the newest one that was [s].
+        measured_at: host time at which the newest state was measured [s].
         stepped: by how much the controller's clock had stepped before that state, ahead or back [s]. 0 where not.
     """
 
     def __init__(self, limit: float) -> None:
         self.fresh = False
+        self.measured_at = -math.inf
         self.stepped = 0.0
         self._limit = limit
         self._controller_time = -math.inf  # of the newest state
@@ -66,7 +68,7 @@ class StateAge:
         if difference < self._now:
             self._now = difference
         smallest = self._now if self._now < self._before else self._before
-        measured_at = min(controller + smallest, host)
+        self.measured_at = measured_at = min(controller + smallest, host)
         if self.fresh:
             self.fresh_at = host
             lag = host - measured_at

@@ -335,3 +335,24 @@ def test_the_driver_s_program_that_ends_unannounced_is_a_fault():
     rig.arm.runtime_state = 1
     rig.run(0.3)
     assert rig.core.phase is Phase.LATCHED
+
+
+@pytest.mark.promise("P20")
+def test_a_guard_that_was_held_up_over_a_restart_reads_its_end_with_its_announcement():
+    """It read both reports, and then the states: running, not running, running. 16 paths of 220 were stopped for it."""
+    rig = GuardRig(speed=0.0).run(0.5)
+    states = []
+    for running in (2, 2, 2, 1, 1, 1, 1, 2, 2):
+        rig.now += 0.002
+        rig.arm.runtime_state = running
+        states.append(rig.arm.poll())
+    rig.now += 0.03
+    report(rig, "restarts")
+    report(rig, "restarted")
+    for state in states:
+        rig.feed(BlockKind.ARM, state)
+    rig.run(0.3)
+    assert rig.core.phase is Phase.ACTIVE
+    rig.arm.runtime_state = 1
+    rig.run(0.3)
+    assert rig.core.phase is Phase.LATCHED
