@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import MissingExtra, SkinConnectionError, SkinTimeout
 
-__all__ = ["PortFacts", "SerialPort", "find_ports", "list_ports"]
+__all__ = ["PortFacts", "SerialPort", "find_ports"]
 
 
 class PortFacts(NamedTuple):
@@ -48,15 +48,6 @@ def find_ports() -> list[PortFacts]:
         description = port.description if port.description not in (None, "n/a", port.name) else ""
         found.append(PortFacts(port.device, description, port.hwid if port.hwid not in (None, "n/a") else ""))
     return found
-
-
-def list_ports() -> list[str]:
-    """Return the serial ports that are there, one line each.
-
-    Raises:
-        MissingExtra: pyserial is not installed.
-    """
-    return [str(port) for port in find_ports()]
 
 
 _MAX_READ = 4096  # bytes in one read
@@ -187,7 +178,7 @@ def _explain(url: str, error: Exception) -> str:
     if isinstance(error, ValueError | KeyError | re.error):
         return f"{url}: not a port or URL that pyserial knows ({text}); write a device, COM3 or socket://host:port"
     if code == errno.ENOENT or "no ports found" in low or "filenotfound" in low:
-        present = ", ".join(list_ports()) or "none at all"
+        present = ", ".join(map(str, find_ports())) or "none at all"
         return f"{url}: no such port; present: {present}"
     if code == errno.ECONNREFUSED or "refused" in low:
         return f"{url}: refused, no program listens there; start it, or correct the port"

@@ -117,8 +117,8 @@ def _ports(args: argparse.Namespace) -> list[str]:
             raise GeometryError("with --simulated the skin is virtual and has no --port: leave one of them out")
         return []
     if not args.port:
-        from coneskin.skin.sources.serial_port import list_ports
+        from coneskin.skin.sources.serial_port import find_ports
 
-        present = ", ".join(list_ports()) or "none at all"
+        present = ", ".join(map(str, find_ports())) or "none at all"
         raise GeometryError(f"add --port, the serial port of the skin; present: {present}")
     return [str(port) for port in args.port]

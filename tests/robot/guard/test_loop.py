@@ -120,6 +120,7 @@ def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
     assert slider.mock_calls == [call.set(0.0), call.set(0.25)]
     names = [block.payload.partition(b"\n")[0].decode() for block in outbox.sent]
     assert names == ["command", "slider", "setpoint", "follow", "slider"]
+    assert {block.time for block in outbox.sent} == {1.0}  # when it was sent, and not when its input came
 
 
 def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import SkinConnectionError
-from coneskin.skin.sources.serial_port import SerialPort, list_ports
+from coneskin.skin.sources.serial_port import SerialPort, find_ports
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
 
@@ -81,7 +81,7 @@ def test_a_port_that_is_not_permitted_tells_what_to_do(monkeypatch):
 
 
 def test_ports_are_listed_one_line_each():
-    assert all("\n" not in line and line for line in list_ports())
+    assert all("\n" not in line and line for line in map(str, find_ports()))
 
 
 @posix

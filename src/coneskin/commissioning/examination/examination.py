@@ -202,9 +202,9 @@ def _port(source: SourceScene) -> Iterator[Finding]:
         return
     path, item = Path(name), "skin, permission"
     if not path.exists():
-        from coneskin.skin.sources.serial_port import list_ports
+        from coneskin.skin.sources.serial_port import find_ports
 
-        there = ", ".join(list_ports()) or "none at all"
+        there = ", ".join(map(str, find_ports())) or "none at all"
         yield Finding(item, "bad", f"there is no {name}; present: {there}", "", "plug it in, or correct source.port")
     elif not os.access(path, os.R_OK | os.W_OK):
         group = _group(path)
