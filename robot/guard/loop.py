@@ -403,6 +403,11 @@ class GuardLoop:
             self._forget(sock)
             sock.close()
             self._feed(BlockKind.LOST, encode_loss(name, why))
+        if not stops.sockets() and self._ports.heartbeat is not None:
+            # nothing is left that stops a servoj, but the controller's own watchdog in a program that has its lines
+            self._forget(self._ports.heartbeat)
+            self._ports.heartbeat.close()
+            self._ports.heartbeat = None
 
     def _feed(self, kind: BlockKind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once. Then record all of it."""
