@@ -17,31 +17,7 @@ from coneskin.robot.stop.limits import MonitoringLimits
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["CompanionMonitor", "StallClock"]
-
-_MIN_STALL: Final = 0.02  # s between two looks, from which on the guard itself was held up
-
-
-class StallClock:
-    """Clock on which the guard's own hold-ups are nobody's silence.
-
-    While the guard is held up it hears nobody. What came meanwhile is read next, one input after the other. So for as
-    long again the longest hold-up is taken off every silence, and not the sum: a guard that is held up again and again
-    reads in between.
-    """
-
-    def __init__(self) -> None:
-        self._looked = -math.inf
-        self._longest = 0.0  # [s]
-        self._until = -math.inf  # when it counts no more
-
-    def fair(self, now: float) -> float:
-        """Return the time by which silences are judged at a host time [s]. To be asked continuously."""
-        stall, self._looked = now - self._looked, now
-        if _MIN_STALL < stall < math.inf:
-            self._longest = stall if now >= self._until else max(stall, self._longest)
-            self._until = now + self._longest
-        return now - self._longest if now < self._until else now
+__all__ = ["CompanionMonitor"]
 
 
 class _Heartbeats:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,86 +24,39 @@ from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, Tou
 from coneskin.skin.detection.stream import TouchStream
 
 from .activation import Activation, ActivationStep, ControllerNeeds
-from .companion_monitor import CompanionMonitor, StallClock
+from .companion_monitor import CompanionMonitor
 from .phase import Phase
 from .signals.contact import Contact, GuardedSensor
-from .signals.journal import BlockKind, EventName, Outputs, decode_loss, emit
+from .signals.journal import BlockKind, EventFolding, EventName, Outputs, decode_loss, emit
 
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
 __all__ = ["GuardCore"]
 
-_BURST_EVENTS = 10  # events of a kind that come as they are
-_CLEAR_TIME = 10.0  # s without one, after which they do so again
-_FIRST_INTERVAL = 1.0  # s until the first count; the next ones take twice as long
-_MAX_INTERVAL = 600.0  # s
+_MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
 
 
-@dataclass(slots=True)
-class _Kind:
-    """Events of one kind that came one upon the other."""
+class _StallClock:
+    """Clock on which the guard's own hold-ups are nobody's silence.
 
-    newest: float  # when the last one came [s]
-    reported: float  # when the last one was put out [s]
-    sent: int = 0
-    held: int = 0  # since then
-    interval: float = _FIRST_INTERVAL
-    details: dict[str, Any] = field(default_factory=dict)
-
-
-class _EventFolding:
-    """Folding of the events of one guard that repeat themselves, by their name and what they are about.
-
-    The first come as they are, then one with a count, at growing intervals: a loose plug made 410 000 events in
-    a night, which bury the event that matters and fill the disk. None is lost: the next one counts those held back.
+    While the guard is held up it hears nobody. What came meanwhile is read next, one input after the other. So for as
+    long again the longest hold-up is taken off every silence, and not the sum: a guard that is held up again and again
+    reads in between.
     """
 
     def __init__(self) -> None:
-        self._kinds: dict[tuple[EventName, str], _Kind] = {}
-        self._due = math.inf  # when the next count is [s]
+        self._looked = -math.inf
+        self._longest = 0.0  # [s]
+        self._until = -math.inf  # when it counts no more
 
-    def emit(self, out: Outputs, name: EventName, about: str, now: float, **details: Any) -> None:
-        """Put an event out, of a host time [s], or hold it back and count it.
-
-        Args:
-            out: takes it.
-            name: of the event.
-            about: what it is about: with the name, the kind.
-            now: host time [s].
-            **details: of the event. The newest are reported.
-        """
-        kind = self._kinds.get((name, about))
-        if kind is None or (now - kind.newest >= _CLEAR_TIME and not kind.held):
-            kind = self._kinds[name, about] = _Kind(now, now)
-        kind.newest = now
-        if kind.sent < _BURST_EVENTS:
-            kind.sent += 1
-            kind.reported = now
-            emit(out, name, now, **details)
-            return
-        kind.held += 1
-        kind.details = details
-        self._due = min(self._due, kind.reported + kind.interval)
-
-    def poll(self, now: float, out: Outputs) -> None:
-        """Report the counts that are due at a host time [s]."""
-        if now < self._due:
-            return
-        for (name, _), kind in self._kinds.items():
-            if kind.held and now >= kind.reported + kind.interval:
-                emit(out, name, now, **kind.details, count=kind.held)
-                kind.held, kind.reported = 0, now
-                kind.interval = min(2.0 * kind.interval, _MAX_INTERVAL)
-        self._due = min((kind.reported + kind.interval for kind in self._kinds.values() if kind.held), default=math.inf)
-
-    def flush(self, now: float, out: Outputs) -> None:
-        """Report every count, and begin anew: what comes now matters."""
-        for (name, _), kind in self._kinds.items():
-            if kind.held:
-                emit(out, name, now, **kind.details, count=kind.held)
-        self._kinds.clear()
-        self._due = math.inf
+    def fair(self, now: float) -> float:
+        """Return the time by which silences are judged at a host time [s]. To be asked continuously."""
+        stall, self._looked = now - self._looked, now
+        if _MIN_STALL < stall < math.inf:
+            self._longest = stall if now >= self._until else max(stall, self._longest)
+            self._until = now + self._longest
+        return now - self._longest if now < self._until else now
 
 
 #: s; a skin that is this far behind does not show what a motion away presses on, however late a scene lets it be
@@ -137,9 +89,9 @@ class GuardCore:
         self._arm = arm
         self._not_commissioned = not_commissioned
         self._phase = Phase.STARTING
-        self._folding = _EventFolding()
+        self._folding = EventFolding()
         self._companions = CompanionMonitor(limits, arm)
-        self._clock = StallClock()
+        self._clock = _StallClock()
         self._fair = 0.0  # host time of this input, on that clock [s]
         self._activation = Activation(limits.settle)
         self._faults: dict[str, str] = {}  # since the last reset: kind -> what is wrong

@@ -7,7 +7,8 @@ import pytest
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard import companion_monitor
-from coneskin.robot.guard.companion_monitor import StallClock, _Heartbeats
+from coneskin.robot.guard.companion_monitor import _Heartbeats
+from coneskin.robot.guard.core import _StallClock
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
@@ -62,7 +63,7 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
 
 
 def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
-    monitor, clock = _Heartbeats({"it": 0.15}), StallClock()
+    monitor, clock = _Heartbeats({"it": 0.15}), _StallClock()
     monitor.feed("it", 1.0)
     assert monitor.silent(clock.fair(1.0)) == {}
     assert monitor.silent(clock.fair(1.5)) == {}  # its heartbeats wait to be read
@@ -76,7 +77,7 @@ def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
 
 
 def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
-    clock = StallClock()
+    clock = _StallClock()
     assert clock.fair(7.0) == 7.0
     assert clock.fair(7.1) == pytest.approx(7.0)
     assert clock.fair(7.1999) == pytest.approx(7.0999 - 0.0, abs=0.1)
@@ -88,7 +89,7 @@ def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
 @pytest.mark.promise("P48")
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
-    monitor, clock = _Heartbeats({"it": 0.15}), StallClock()
+    monitor, clock = _Heartbeats({"it": 0.15}), _StallClock()
     monitor.feed("it", 0.0)
     now = 0.0
     while not monitor.silent(clock.fair(now)):

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coneskin.robot.guard.core import _EventFolding
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.signals.journal import BlockKind, EventName
+from coneskin.robot.guard.signals.journal import BlockKind, EventFolding, EventName
 from coneskin.robot.reaction.types import Reaction
 from tests.support.guard_rig import GuardRig, touch
 
@@ -17,7 +16,7 @@ from tests.support.guard_rig import GuardRig, touch
 @pytest.mark.promise("P57")
 @given(st.lists(st.tuples(st.floats(0.0, 30.0), st.sampled_from("ab")), max_size=60))
 def test_every_event_is_put_out_or_counted(gaps):
-    folding, out, now = _EventFolding(), [], 0.0
+    folding, out, now = EventFolding(), [], 0.0
     for gap, about in gaps:
         now += gap
         folding.poll(now, out)
@@ -30,7 +29,7 @@ def test_every_event_is_put_out_or_counted(gaps):
 
 @pytest.mark.promise("P57")
 def test_a_loose_plug_of_a_night_is_a_hundred_lines():
-    folding, out = _EventFolding(), []
+    folding, out = EventFolding(), []
     for n in range(14 * 3600):  # an hour
         folding.poll(n / 14.0, out)
         folding.emit(out, EventName.FAULT, "open", n / 14.0, what="open")
