@@ -55,6 +55,7 @@ BENCHES = {
     "collision": Bench(
         "bench.collision.newtons", "Forces that a person would bear: these figures compare ways to protect a body."
     ),
+    "bare-sides": Bench("bench.collision.bare_sides", "Friction in the joints, and noise of their currents."),
     "collision-settled": Bench("bench.collision.settled", "A real controller may end such a motion first (C153)."),
     "impact-agreement": Bench(
         "bench.impact.agreement", "Other links, other arms, and pushes by more than one joint: it bounds nothing."

@@ -29,6 +29,7 @@ kind = "virtual"
 [reaction]
 kind = "retreat"
 distance_mm = 30
+bare_side = "fast"   # what has no skin leads in the retreat, and nothing is there in this simulation
 
 [monitoring]
 skin_silence_ms = 1000

@@ -61,7 +61,7 @@ class RandomImpact:
     def scene(self, reaction: str) -> Scene:
         """Return the scene of the arm with a reaction, as if commissioned; the other tube is bare."""
         link = self.place[0].removesuffix(" skin")
-        return commissioned(parse_scene(scene_text(self.arm, f'kind = "{reaction}"', (link,))))
+        return commissioned(parse_scene(scene_text(self.arm, f'kind = "{reaction}"\nbare_side = "allowed"', (link,))))
 
 
 def scene_text(arm: str, reaction: str, links: tuple[str, ...] = ("upper_arm", "forearm")) -> str:

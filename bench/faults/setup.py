@@ -15,8 +15,8 @@ GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 SKIN_SILENCE = ARM_SILENCE = 0.25  # s; a pseudo-terminal on a busy machine can stall for 0.1 s
 STUCK_FRAMES = 200  # frames
-RETREAT = 'kind = "retreat"\ndistance_mm = 60'
-COMPLY = 'kind = "comply"\ndistance_mm = 100'
+RETREAT = 'kind = "retreat"\ndistance_mm = 60\nbare_side = "fast"'
+COMPLY = 'kind = "comply"\ndistance_mm = 100\nbare_side = "fast"'
 SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
 LONG_SLOW = f"{SLOW}\npress_mm = 30"  # an arm that goes on until the place of the touch is certain
 MONITORING_TABLE = (

@@ -25,6 +25,7 @@ __all__ = [
     "JointLimits",
     "TablePlane",
     "Workspace",
+    "arm_parts",
     "reach",
     "skeleton",
 ]
@@ -133,6 +134,26 @@ def _tubes(model: ArmModel) -> tuple[tuple[int, Vector, Vector], ...]:
 
 #: names of the parts between the corners of the skeleton, from the base on
 _PART_NAMES = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "wrist 2", "wrist 3")
+
+
+@functools.lru_cache(maxsize=32)
+def arm_parts(model: ArmModel) -> tuple[tuple[str, int, Vector, Vector], ...]:
+    """Return the straight parts that joints move: name, index of the DH frame, and both ends in that frame [m]."""
+    poses = link_poses(model, (0.0,) * 6)  # no joint turns an end about another axis than that of its part
+    (upper, upper_begin, upper_end), (fore, fore_begin, fore_end) = _tubes(model)
+    elbow_end = poses[upper].inverse().apply(poses[fore].apply(fore_begin))
+    parts = [
+        ("shoulder", 1, (0.0, 0.0, 0.0), poses[1].inverse().apply(poses[upper].apply(upper_begin))),
+        ("upper arm", upper, upper_begin, upper_end),
+        ("elbow", upper, upper_end, elbow_end),
+        ("forearm", fore, fore_begin, fore_end),
+    ]
+    begins = (poses[fore].apply(fore_end), poses[4].translation, poses[5].translation)
+    for link, begin in enumerate(begins, 4):
+        parts.append((f"wrist {link - 3}", link, poses[link].inverse().apply(begin), (0.0, 0.0, 0.0)))
+    return tuple(parts)
+
+
 #: pairs of parts that can meet; neighbours cannot, and a forearm folds beside its upper arm, not onto it
 _PART_PAIRS = tuple((a, b) for a in (0, 1, 2) for b in (4, 5, 6, 7) if (a, b) != (2, 4) and (a, b) != (2, 5))
 

@@ -242,6 +242,7 @@ class ArmSupervisor:
         """Take a measured state."""
         self.state = state
         stop, measured_at, phase = self._stop, self.state_age.feed(state), self.supervision.phase
+        self._away.feed(state, phase is Phase.ACTIVE and not self._touches.contacts)
         if state.stopped_by_safety or not state.powered:
             self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
         elif self.state_age.stepped:

@@ -21,6 +21,10 @@ __all__ = ["ReactionMotion", "plan_reaction_motion"]
 
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
 _MIN_SPEED = 1e-3  # m/s; slower counts as standing
+_PUSH_DAMPING = 1500.0  # N s/m; between a push that the joints feel and the speed at which it is followed
+_MAX_CARRIED = 15.0  # N that something else may take off a push whose touch does not become lighter, or _CARRIED_SHARE
+_CARRIED_SHARE = 0.5  # of the push; as much less than that does not show in the level of a firm touch
+_LIGHTER = 0.01  # of the level; six times its noise
 
 
 class _AdmittanceMotion:
@@ -28,6 +32,11 @@ class _AdmittanceMotion:
 
         v_wanted = speed * min(1, (level - threshold) / (full_level - threshold))    along -n, of the touched point
         v       += (v_wanted - v) * (1 - exp(-dt / _DAMPING_TIME))                   so that it neither jumps nor rings
+
+    The joints have to feel the push as well: with the force F that drives the arm along its motion, t . qd / v with the
+    torque t from outside, v is at most F / _PUSH_DAMPING. What presses against the arm behind, where a skin is or not,
+    takes that force away. So the arm comes to rest where both are equal, and presses no harder than it is pushed. Where
+    the touch has not become lighter meanwhile, it rests as soon as half of the push is gone, or 15 N.
 
     Point and normal are taken anew in each cycle, where the touch is then. Where that is not known, or where touches
     push against each other, the arm stands. Each cycle is one step of a retreat (``retreat``) from where the arm is, so
@@ -54,6 +63,7 @@ class _AdmittanceMotion:
         self._sweep = ArmSweep.begin(model, state.q)
         self._began = self._newest = state.time
         self._progress = 0.0  # how far touched points have given way so far [m]
+        self._strongest = 0.0, 0.0  # push since the touch became lighter [N], and its level
         self.speed = 0.0
         self.plan: RetreatPlan | None = None
 
@@ -74,6 +84,8 @@ class _AdmittanceMotion:
             return Done("the distance is made", progress)
         if not state.time - self._began < reaction.time_budget:
             return Done(f"the time of {reaction.time_budget} s is over", progress)
+        if state.torque is None:
+            return Done("the controller sends no motor currents: nothing shows what the arm presses on", progress)
         placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
         against = placed and opposed(self._model, state.q, contacts)
         wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
@@ -92,13 +104,30 @@ class _AdmittanceMotion:
         if isinstance(plan, Done) or isinstance(step, Done):
             assert isinstance(step, Done)
             return Done(step.reason, progress)
-        clipped = step.clipped_by
+        clipped, driven = step.clipped_by, 0.0
+        if step.away > 0.0:
+            rows = zip(state.torque, state.doubt, step.qd, strict=True)
+            driven = sum(t * v - doubt * abs(v) for t, doubt, v in rows) / step.away
+        if step.away > (most := max(0.0, self._free_push(driven, contacts)) / _PUSH_DAMPING):
+            share = most / step.away
+            a, b, c, d, e, f = (share * v for v in step.qd)
+            rate = reaction.deceleration if most < self.speed else reaction.acceleration
+            step = replace(step, qd=(a, b, c, d, e, f), away=most, acceleration=rate)
+            clipped, speed = (*clipped, "push"), most
         if wanted < reaction.speed:
             clipped += ("level",)
         if speed < 0.99 * wanted:  # it gets there, but never quite
             clipped += ("damping",)
         self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, plan
         return replace(step, progress=progress, clipped_by=clipped)
+
+    def _free_push(self, driven: float, contacts: Sequence[ContactOnLink]) -> float:
+        """Return how much of a push [N] may be followed: what is left of it above what something else may carry."""
+        level = max(contact.level for contact in contacts)
+        strongest, then = self._strongest
+        if driven >= strongest or level < then - _LIGHTER:
+            self._strongest = strongest, then = driven, level
+        return driven - max(0.0, strongest - max(_MAX_CARRIED, _CARRIED_SHARE * strongest))
 
 
 def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:

@@ -13,10 +13,12 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
 
-__all__ = ["KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
+__all__ = ["BARE_SIDES", "KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
 
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
+#: what a motion away does where it would move outward what no skin covers
+BARE_SIDES = ("stop", "allowed", "fast")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +29,15 @@ class ArmState:
         time: of the measurement, on the clock of the guard [s].
         q: joint positions [rad].
         qd: joint speeds [rad/s].
+        torque: from outside on the joints [N m]. None where it is not measured.
+        doubt: largest torque that was seen on each joint while nothing touched [N m].
     """
 
     time: float
     q: Joints
     qd: Joints = ZERO_VELOCITY
+    torque: Joints | None = None
+    doubt: Joints = ZERO_VELOCITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +80,8 @@ class Reaction:
         arm_speed: that no point of the bare arm exceeds while retreating [m/s]; a bound by the reach of each joint.
         arm_distance: that no point of the bare arm goes from where the motion began [m].
         full_level: level at which comply gives way with its full speed.
+        bare_side: what a motion away does that would move a surface outward which no skin covers: "stop" does not
+            begin it, "allowed" makes it slowly, "fast" makes it as any other.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
         press: how far the surface may move into a touch while the arm is slow, the way of a stop included; what
@@ -92,13 +100,15 @@ class Reaction:
     arm_speed: float = 0.25
     arm_distance: float = 0.1
     full_level: float = 0.6
+    bare_side: str = "stop"
     slow_to: float = 0.2
     slow_speed: float = 0.05
     press: float = 0.0005
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise RobotRefused(f"reaction kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
+        for name, choices in (("kind", KINDS), ("bare_side", BARE_SIDES)):
+            if (word := getattr(self, name)) not in choices:
+                raise RobotRefused(f"reaction {name} must be one of {', '.join(choices)}, got {word!r}")
         # 40 rad/s^2 is the most that the UR driver lets through; 1.5 m/s the fastest tool of that family
         for name, unit, most in (
             ("deceleration", "rad/s^2", 40.0),
@@ -129,8 +139,8 @@ class JointVelocity:
         progress: how far it has got so far [m]; the farthest over several touches.
         clipped_by: what kept it from moving as set: "joint speed", "arm speed", "distance" or "arm distance"
             (it brakes for the end),
-            "singularity", "joint 3 limit"; of comply also "level" (pushed less than fully), "damping",
-            "place" (it is not known).
+            "singularity", "joint 3 limit", "bare side" (what no skin covers leads); of comply also "level" (pushed less
+            than fully), "damping", "place" (it is not known), "push" (the joints feel less of a push).
     """
 
     qd: Joints

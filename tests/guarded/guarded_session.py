@@ -17,6 +17,9 @@ from pathlib import Path
 import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
+from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
+from coneskin.robot.reaction.types import ContactOnLink
+from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START, commissioned, forearm_scene
@@ -41,6 +44,7 @@ def scene_text(host, changes=None, control="internal"):
     in virtual time (test_guard_core).
     """
     text = forearm_scene(host, control, reaction='kind = "retreat"\ndistance_mm = 30', limits=PATIENT)
+    text = text.replace("[reaction]", '[reaction]\nbare_side = "fast"')
     text = text.replace("[arm]", "[arm]\nwatchdog_hz = 1")
     for old, new in (changes or {}).items():
         assert old in text, old
@@ -66,6 +70,14 @@ def moving(session, goal=FAR):
     thread = threading.Thread(target=move)
     thread.start()
     return thread, raised
+
+
+def push_joints(controller, scene, u=0.13, phi=1.55, force=100.0):
+    """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them."""
+    at = place_on_arm(scene)[0]
+    turns = push_torque(at.model, tuple(controller.state()["q"]), ContactOnLink(at.link, *at.place(u, phi)))
+    for joint, (turn, each) in enumerate(zip(turns, TORQUE_PER_AMPERE, strict=True), 1):
+        controller.call(f"resist {joint} {-force * turn / each:.4f}")
 
 
 def until(what, seconds=DEADLINE):

@@ -22,7 +22,17 @@ from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 from tests.support.sweep import sweep
 
-from .guarded_session import DEADLINE, assert_short_slices, fast, kill, scene_for, scene_text, until, until_undisturbed
+from .guarded_session import (
+    DEADLINE,
+    assert_short_slices,
+    fast,
+    kill,
+    push_joints,
+    scene_for,
+    scene_text,
+    until,
+    until_undisturbed,
+)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
@@ -181,10 +191,15 @@ def test_whatever_moves_the_arm_is_stopped_and_the_arm_retreats(controller, run,
 
 @pytest.mark.long
 def test_it_gives_way_to_a_push(controller, run):
+    scene = external(controller, {"retreat": "comply", "distance_mm = 30": "distance_mm = 200"})
+
     def attempt():
-        with guard(external(controller, {"retreat": "comply", "distance_mm = 30": "distance_mm = 200"})) as session:
+        push_joints(controller, scene, force=0.0)
+        with guard(scene) as session:
             run("raw URScript")
             session.touch(0.13, 1.55, duration=1.0, force=20.0)
+            assert session.wait_for(("stopping",), DEADLINE) is not None
+            push_joints(controller, scene)
             assert session.wait_for(("latched",), DEADLINE) is not None
             controller.wait_for_standstill()
             return session.events

@@ -23,6 +23,7 @@ from .guarded_session import (
     fast,
     is_reset,
     kill,
+    push_joints,
     refusal,
     run_until_moving,
     scene_for,
@@ -83,10 +84,13 @@ def test_comply_gives_way_and_latches_when_the_push_ends(controller):
 
     def attempt():
         controller.wait_for_standstill()
+        push_joints(controller, scene, force=0.0)
         with guard(scene) as session:
             session.arm.move_j(START, speed=1.0, acceleration=4.0)
             thread, raised = run_until_moving(controller, session)
             session.touch(0.13, 1.55, duration=1.0)  # until which it pushes: 30 mm at most
+            assert session.wait_for(("stopping",), DEADLINE) is not None
+            push_joints(controller, scene)
             thread.join(DEADLINE)
             assert isinstance(raised[0], Collision)
             assert session.wait_for(("latched",), DEADLINE) is not None

@@ -44,4 +44,4 @@ def test_a_force_beside_the_skin_ends_the_retreat(tmp_path):
 
     (over,) = (event.details for event in until_undisturbed(attempt) if event.name == "retreated")
     assert over["complete"] is False
-    assert over["why"] == "joint 2 takes 4.0 A more than expected: something resists it"
+    assert over["why"] == "joint 2 takes 48.0 N m more than its touches explain: something resists it"

@@ -38,8 +38,9 @@ Q = (-0.7, -1.6, 1.6, -1.6, -1.6, 0.0)
 def arm_payload(time: float, speed: float = 0.0) -> bytes:
     """Return what a controller sends while joint 1 turns at this speed [rad/s]."""
     names = ("timestamp", "actual_q", "actual_qd", "robot_mode", "safety_status_bits", "runtime_state")
+    names += ("actual_current", "target_current")
     still = (0.0,) * 5
-    return rtde.Recipe(names).pack([time, Q, (speed, *still), 7, 1, 2])
+    return rtde.Recipe(names).pack([time, Q, (speed, *still), 7, 1, 2, (0.0,) * 6, (0.0,) * 6])
 
 
 def inputs(scene: Scene, touch: ScriptedTouch, end: float = 1.5) -> Iterator[Block]:

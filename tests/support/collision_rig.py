@@ -22,9 +22,10 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
+from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.rules import Rule
-from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
@@ -177,6 +178,7 @@ class CollisionRig:
             item.update(link_pose(self._model, q, item.link), self.now - self.began, STEP)
             body = item.body
             presses[body] = Press(body.sensor, body.u, body.phi, item.force, body.radius)
+        self.arm.current = self._held(q)
         self._device.press(presses, STEP)
         self._unread.append(b"".join([next(self._packets)[1] for _ in self._skins]))
         while len(self._unread) * STEP > self.lag + 1e-9:
@@ -187,6 +189,16 @@ class CollisionRig:
                 self._feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
             self._feed(BlockKind.ARM, self.arm.poll())
         self._feed(BlockKind.TICK)
+
+    def _held(self, q: Sequence[float]) -> list[float]:
+        """Return the currents that hold the arm against the bodies [A]."""
+        torque = [0.0] * 6
+        for item in self.pressing:
+            if item.force > 0.0:
+                place = ContactOnLink(item.link, item.point, item.normal)
+                pushed = push_torque(self._model, tuple(q), place)  # type: ignore[arg-type]
+                torque = [a + item.force * b for a, b in zip(torque, pushed, strict=True)]
+        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
 
     def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
         self._take(Block(kind, self.now, payload))

@@ -19,10 +19,11 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
+from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule
-from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
@@ -38,6 +39,7 @@ from coneskin.skin.virtual.skin import VirtualSkin
 
 __all__ = ["CONE", "LINK", "MODEL", "START_Q", "GuardRig", "felt", "make_core", "touch"]
 
+_PUSH = 300.0  # N
 _LEAVES = 0.05  # rad/s at which the arm leaves what has touched it
 
 MODEL = arm_model("UR5e")
@@ -56,7 +58,8 @@ def touch(
 class GuardRig:
     """Rig that runs a core; ``events``, ``outputs`` and ``blocks`` hold what came of it.
 
-    What touches rests: it is off the skin once the arm moves away from it, unless it ``follows``.
+    What touches rests: it is off the skin once the arm moves away from it, unless it ``follows``. The joints feel what
+    follows a complying arm, as a push that is firm enough for any speed.
     """
 
     def __init__(
@@ -99,6 +102,7 @@ class GuardRig:
         self.mute_skin = self.mute_arm = False
         self.companions = CompanionProcesses()
         self._follows = follows or (reaction is not None and reaction.kind == "comply")
+        self._pushes = touches if reaction is not None and reaction.kind == "comply" else ()
         self._packets: Iterator[tuple[float, bytes]] = self.skin.packets()
 
     def feed(self, kind: BlockKind, payload: bytes = b"") -> list[object]:
@@ -156,6 +160,8 @@ class GuardRig:
                     self.feed(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
                 if self.core.phase is Phase.ACTIVE and self.arm.target is None:
                     self.arm.go([self.speed, 0, 0, 0, 0, 0], 4.0)
+                if self._pushes:
+                    self.arm.current = self._held()
                 payload = self.arm.poll()
                 if not self.mute_arm:
                     self.feed(BlockKind.ARM, payload)
@@ -163,6 +169,16 @@ class GuardRig:
             if not heard:  # as the live loop: any input is a look at the clocks as well
                 self.feed(BlockKind.TICK)
         return self
+
+    def _held(self) -> list[float]:
+        """Return the currents that hold the arm against what pushes it [A]."""
+        q, torque = tuple(self.arm.q), [0.0] * 6
+        for item in self._pushes:
+            if item.start <= self.now - 100.0 < item.end:
+                place = ContactOnLink(LINK, CONE.point(item.u, item.phi), CONE.normal(item.phi))
+                pushed = push_torque(MODEL, q, place)  # type: ignore[arg-type]
+                torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
+        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
 
     @property
     def names(self) -> list[str]:

@@ -57,6 +57,11 @@ class MotionAway:
         """How far it has got [m]."""
         return 0.0 if self._stream is None else self._stream.progress
 
+    def feed(self, state: ControllerState, untouched: bool) -> None:
+        """Take a measured state. ``untouched`` while nothing touches and the arm is free."""
+        if self._planner is not None:
+            self._planner.torque.feed(state, untouched)
+
     def prepare(self, state: ControllerState | None) -> None:
         """Begin with a new stop, from the state in which its cause was seen."""
         self._at_touch = None if state is None else ArmState(state.time, state.q, state.qd)

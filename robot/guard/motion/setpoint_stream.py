@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
 from coneskin.robot.arm.workspace import TablePlane, Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram
-from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
+from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
 from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_way, emit
+from coneskin.robot.reaction.bare_side import MAX_BARE_WAY, BareSides
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
 from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_motion
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
@@ -86,6 +88,11 @@ _SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoin
 _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
 
 
+#: m/s of a surface that no skin covers, outward, where the scene allows that: the joints feel what it meets in 15 ms
+MAX_BARE_SPEED = 0.02
+_BARE_STEP = 0.02  # s ahead over which that speed is taken
+
+
 class ReactionPlanner:
     """Planner that begins the motion that a reaction wants.
 
@@ -93,9 +100,21 @@ class ReactionPlanner:
         model: the arm.
         watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
         table: what the arm must not go below while it moves.
+        bare: sides of the arm that no skin covers. None where there are none.
+
+    Attributes:
+        torque: from outside on the joints.
     """
 
-    def __init__(self, model: ArmModel, watchdog_hz: float | None = None, table: TablePlane | None = None) -> None:
+    def __init__(
+        self,
+        model: ArmModel,
+        watchdog_hz: float | None = None,
+        table: TablePlane | None = None,
+        bare: BareSides | None = None,
+    ) -> None:
+        self.torque = OutsideTorque()
+        self._bare = bare
         self._model = model
         self._watchdog_hz = watchdog_hz
         self._token = 0
@@ -118,9 +137,27 @@ class ReactionPlanner:
             contacts: the touches, as they were last seen.
             out: takes commands and events.
         """
+        if self.torque.now is None:
+            return "the controller sends no motor currents: nothing shows what the arm presses on"
         motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
+        if self._bare is not None and reaction.bare_side == "stop":
+            toward = (
+                motion
+                if motion.how != "push"
+                else plan_reaction_motion(
+                    self._model, replace(reaction, kind="retreat"), here, here, contacts, self._workspace
+                )
+            )
+            if isinstance(toward, str):
+                return toward
+            step = toward.update(here, contacts)
+            if isinstance(step, Done):
+                return step.reason
+            time = (reaction.distance - step.progress) / step.away
+            if why := _bare_way(self._bare, here.q, [q + time * v for q, v in zip(here.q, step.qd, strict=True)]):
+                return why
         return self._stream(motion, reaction, here, contacts, out)
 
     def _stream(
@@ -136,7 +173,21 @@ class ReactionPlanner:
         if self._watchdog_hz is not None:
             self._token += 1
             program = SetpointProgram(self._token, reaction.deceleration, self._watchdog_hz)
-        return MotionStream(motion, supervision, here.time, program, out)
+        resistance = ResistanceMonitor(self._model, self.torque, motion.how == "push")
+        bare = None if reaction.bare_side == "fast" else self._bare
+        allowed = reaction.bare_side == "allowed"
+        return MotionStream(motion, supervision, self.torque, resistance, bare, allowed, here, program, out)
+
+
+def _bare_way(bare: BareSides, q: Joints, there: Sequence[float]) -> str:
+    """Return why the arm must not go there from q. Empty where no bare side moves outward by more than a little."""
+    way, part = bare.way(q, there)
+    if way <= MAX_BARE_WAY:
+        return ""
+    return (
+        f"no skin covers the {part}, which would move {1e3 * way:.0f} mm outward ({1e3 * MAX_BARE_WAY:g} mm at most): "
+        'cover it, or write bare_side = "allowed"'
+    )
 
 
 class MotionStream:
@@ -145,7 +196,11 @@ class MotionStream:
     Args:
         motion: what to do.
         supervision: of the touches meanwhile.
-        now: host time [s].
+        torque: from outside on the joints.
+        resistance: to this motion.
+        bare: sides that no skin covers, or None.
+        allowed: True where they may lead, slowly.
+        here: the arm as it begins.
         program: that follows the setpoints. None where the driver process does.
         out: takes commands and events.
 
@@ -158,7 +213,11 @@ class MotionStream:
         self,
         motion: ReactionMotion,
         supervision: ContactSupervision,
-        now: float,
+        torque: OutsideTorque,
+        resistance: ResistanceMonitor,
+        bare: BareSides | None,
+        allowed: bool,
+        here: ArmState,
         program: SetpointProgram | None,
         out: Outputs,
     ) -> None:
@@ -167,11 +226,13 @@ class MotionStream:
         self.progress = 0.0
         self.how = motion.how
         self._program = program
-        self._began = now
+        self._began = now = here.time
+        self._start = here.q
+        self._torque, self._resistance = torque, resistance
+        self._bare, self._allowed = bare, allowed
         self._sent = -math.inf
         self._braking: float | None = None  # how far the touched surface went on until this began [m]
         self._following_error = _FollowingErrorMonitor(now)
-        self._currents = JointCurrentMonitor() if motion.how != "push" else None  # a firmer push is what that follows
         emit(out, EventName.RETREATING, now, **self.details)
 
     @property
@@ -198,7 +259,8 @@ class MotionStream:
             contacts: the touches there are now.
             out: takes commands and events.
         """
-        step = self._motion.update(ArmState(state.time, state.q, state.qd), contacts)
+        torque = self._torque
+        step = self._motion.update(ArmState(state.time, state.q, state.qd, torque.now, torque.spread), contacts)
         self.progress = step.progress
         if self._braking is None:
             self._braking = max(-step.progress, 0.0)
@@ -206,7 +268,7 @@ class MotionStream:
             return step
         if contacts and (over := self.resisted(state.time, state.q, contacts)) is not None:
             return over
-        if self._currents is not None and (why := self._currents.resistance(state)):
+        if why := self._resistance.resistance(state.q, contacts):
             return Done(why, step.progress)
         program, first = self._program, self._sent == -math.inf
         exceeded = self._following_error.exceeded(state, step.progress)
@@ -216,6 +278,11 @@ class MotionStream:
         if exceeded:
             return Done("the arm does not move as commanded: something else moves it", step.progress)
         if state.time - self._sent >= _SETPOINT_PERIOD - 1e-9:
+            if self._bare is not None:
+                limited = self._limit(self._bare, state, step)
+                if isinstance(limited, str):
+                    return Done(limited, step.progress)
+                step = limited
             if program is None:
                 out.append(SetJointVelocity(step.qd, step.acceleration))
             else:
@@ -227,6 +294,19 @@ class MotionStream:
             self._sent = state.time
             self._following_error.command(step)
         return None
+
+    def _limit(self, bare: BareSides, state: ControllerState, step: JointVelocity) -> JointVelocity | str:
+        """Return the step no faster than a bare side may move outward, or why there is none."""
+        ahead = [q + _BARE_STEP * v for q, v in zip(state.q, step.qd, strict=True)]
+        if not self._allowed:
+            return _bare_way(bare, self._start, ahead) or step
+        speed = bare.way(state.q, ahead)[0] / _BARE_STEP
+        if speed <= MAX_BARE_SPEED:
+            return step
+        share = MAX_BARE_SPEED / speed
+        a, b, c, d, e, f = (share * v for v in step.qd)
+        by = (*step.clipped_by, "bare side")
+        return replace(step, qd=(a, b, c, d, e, f), away=share * step.away, clipped_by=by)
 
     def report(self, now: float, over: Done, out: Outputs) -> str:
         """Report the end of the motion at a host time [s], and return it in words."""

@@ -1,44 +1,147 @@
-"""Joint-current monitor: it notices that a force resists a motion of ours, on the skin or beside it. Pure.
+"""Torque from outside on the joints, as the motor currents show it, and what of it no touch explains. Pure.
 
-What the motors take beyond what the controller expects of the motion is friction, load and whatever pushes on the arm.
-Friction and load change little while an arm moves away slowly. So each deviation is compared with the least one since
-the motion began. The push of the touch itself fades while the arm moves away.
+    symbol    meaning
+    t         torque from outside [N m]: k (i_expected - i_measured), less what it was while nothing touched
+    g_c       torque of a push of 1 N on touch c: J^T (-n)
+    F_c       force of touch c [N]
+    r         t - sum F_c g_c, with the F_c >= 0 that leave the least of it
+
+What the controller expects contains inertia and payload. What is left while nothing touches is friction, and what the
+payload was set wrong by: it is learned until the touch. The whole arm is a sensor in this way, where no skin is too.
+A body behind that pushes against a touch takes that touch's force away, so that its own shows in r once it is greater.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Final
+
+from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.values import ControllerState
+from coneskin.robot.reaction.types import ContactOnLink
 
-__all__ = ["MAX_RISE", "JointCurrentMonitor"]
+__all__ = ["MAX_UNEXPLAINED", "TORQUE_PER_AMPERE", "OutsideTorque", "ResistanceMonitor", "push_torque"]
 
-#: A by which a joint's current may deviate more than at its least since the motion began. Assumed, not measured on an
-#: arm: with about 12 N m/A at base, shoulder and elbow, and 9 at the wrists, 25 and 9 N m.
-MAX_RISE = (2.0, 2.0, 2.0, 1.0, 1.0, 1.0)
-_RESISTED_SAMPLES = 5  # in a row, 10 ms; a single one may be noise
+#: N m/A of each joint. Assumed, not measured on an arm
+TORQUE_PER_AMPERE: Final = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)
+_MIN_UNEXPLAINED: Final = (3.0, 3.0, 3.0, 1.5, 1.5, 1.5)  # N m; of a joint without noise and friction
+#: N m; however large noise and friction are
+MAX_UNEXPLAINED: Final = (24.0, 24.0, 24.0, 9.0, 9.0, 9.0)
+_SPREADS: Final = 3.0  # of what was learned, that count as nothing
+_LEARNING_TIME: Final = 500.0  # states, 1 s
+_RESISTED_SAMPLES: Final = 3  # in a row, 6 ms; a single one may be noise
+_FIT_ROUNDS: Final = 3  # over the touches; they are few, and seldom alike
 
 
-class JointCurrentMonitor:
-    """Monitor of one reaction motion. It sees nothing where the controller sends no currents."""
+class OutsideTorque:
+    """Torque from outside on the joints of one arm.
+
+    Attributes:
+        now: by the newest state [N m]. None where the controller sends no currents.
+    """
 
     def __init__(self) -> None:
-        self._least: list[float] | None = None
+        self.now: Joints | None = None
+        self._usual: Joints | None = None
+        self._spread: Joints = (0.0,) * 6
+
+    def feed(self, state: ControllerState, untouched: bool) -> None:
+        """Take a measured state. While nothing touches and the arm is free, what it shows is learned."""
+        if state.current is None or state.target_current is None:
+            self.now = None
+            return
+        both = zip(TORQUE_PER_AMPERE, state.target_current, state.current, strict=True)
+        raw = _six([k * (expected - measured) for k, expected, measured in both])
+        if self._usual is None:
+            self._usual = raw
+        usual = self._usual
+        off = self.now = _six([a - b for a, b in zip(raw, usual, strict=True)])
+        if untouched:
+            self._usual = _six([a + b / _LEARNING_TIME for a, b in zip(usual, off, strict=True)])
+            kept = 1.0 - 1.0 / _LEARNING_TIME
+            self._spread = _six([max(abs(a), kept * b) for a, b in zip(off, self._spread, strict=True)])
+
+    @property
+    def spread(self) -> Joints:
+        """Largest torque of each joint lately, while nothing touched [N m]."""
+        return self._spread
+
+    @property
+    def tolerance(self) -> Joints:
+        """Torque of each joint that counts as nothing [N m]."""
+        rows = zip(_MIN_UNEXPLAINED, MAX_UNEXPLAINED, self._spread, strict=True)
+        return _six([min(most, least + _SPREADS * spread) for least, most, spread in rows])
+
+
+class ResistanceMonitor:
+    """Monitor of one motion of ours: does something resist it, on the skin or beside it?
+
+    Args:
+        model: the arm.
+        torque: from outside.
+        yields: True where the motion gives way to a push, which may grow. Else no push may be more than at its start.
+        tolerance: torque of each joint that counts as nothing [N m]. None for what was learned.
+    """
+
+    def __init__(self, model: ArmModel, torque: OutsideTorque, yields: bool, tolerance: Joints | None = None) -> None:
+        self._model = model
+        self._torque = torque
+        self._yields = yields
+        self._tolerance = tolerance or torque.tolerance
+        self._pushes: dict[int, ContactOnLink] = {}  # touch -> with the newest certain place
+        self._most: dict[int, float] = {}  # touch -> largest force [N]
+        self._least: Joints | None = None
         self._beyond = 0  # samples in a row
 
-    def resistance(self, state: ControllerState) -> str:
-        """Take a measured state and return why the motion must end. Empty where it may go on."""
-        if state.current is None or state.target_current is None:
-            return ""
-        off = [a - b for a, b in zip(state.current, state.target_current, strict=True)]
-        least = self._least = off if self._least is None else list(map(_nearer_zero, self._least, off))
-        rises = [abs(a - b) - most for a, b, most in zip(off, least, MAX_RISE, strict=True)]
-        worst = max(range(len(rises)), key=rises.__getitem__)
-        self._beyond = self._beyond + 1 if rises[worst] > 0.0 else 0
+    def resistance(self, q: Joints, contacts: Sequence[ContactOnLink]) -> str:
+        """Take measured joint positions [rad] and the touches. Return why the motion must end; empty: it need not."""
+        torque = self._torque.now
+        if torque is None:
+            return "the controller sends no motor currents: nothing shows what the arm presses on"
+        for contact in contacts:
+            if contact.link and contact.location_valid:
+                self._pushes[contact.number] = contact
+        left = self._unexplained(q, torque)
+        least = self._least = left if self._least is None else _six(list(map(_nearer_zero, self._least, left)))
+        rises = [abs(a - b) / most for a, b, most in zip(left, least, self._tolerance, strict=True)]
+        worst = max(range(6), key=rises.__getitem__)
+        self._beyond = self._beyond + 1 if rises[worst] > 1.0 else 0
         if self._beyond < _RESISTED_SAMPLES:
             return ""
-        rise = rises[worst] + MAX_RISE[worst]
-        return f"joint {worst + 1} takes {rise:.1f} A more than expected: something resists it"
+        rise = rises[worst] * self._tolerance[worst]
+        return f"joint {worst + 1} takes {rise:.1f} N m more than its touches explain: something resists it"
+
+    def _unexplained(self, q: Joints, torque: Joints) -> Joints:
+        left, forces = list(torque), dict.fromkeys(self._pushes, 0.0)
+        for _ in range(_FIT_ROUNDS if len(forces) > 1 else 1):
+            for number, contact in self._pushes.items():
+                push = push_torque(self._model, q, contact)
+                weighted = [g / (w * w) for g, w in zip(push, self._tolerance, strict=True)]
+                square = sum(a * b for a, b in zip(push, weighted, strict=True))
+                if square <= 0.0:
+                    continue
+                before = forces[number]
+                force = before + sum(a * b for a, b in zip(left, weighted, strict=True)) / square
+                force = max(0.0, force if self._yields else min(force, self._most.setdefault(number, max(0.0, force))))
+                forces[number] = force
+                left = [a - (force - before) * g for a, g in zip(left, push, strict=True)]
+        return _six(left)
+
+
+def push_torque(model: ArmModel, q: Joints, contact: ContactOnLink) -> Joints:
+    """Return the torques on the joints of a push of 1 N on a touch [N m], at joint positions q [rad]."""
+    place = compile_contact(model, contact.link).place(*q, *contact.point, *contact.normal)
+    nx, ny, nz, *columns = place[3:]
+    turns = [-(columns[3 * i] * nx + columns[3 * i + 1] * ny + columns[3 * i + 2] * nz) for i in range(contact.link)]
+    return _six([*turns, *[0.0] * (6 - contact.link)])
 
 
 def _nearer_zero(a: float, b: float) -> float:
     """Return the smaller of two deviations, 0 where they have changed sides."""
     return 0.0 if a * b < 0.0 else min(a, b, key=abs)
+
+
+def _six(values: Sequence[float]) -> Joints:
+    a, b, c, d, e, f = values
+    return a, b, c, d, e, f

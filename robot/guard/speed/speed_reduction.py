@@ -21,7 +21,7 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
 if TYPE_CHECKING:  # a scene without a slow reaction does not load it
-    from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
+    from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
     from coneskin.robot.reaction.contact_supervision import ContactApproach
 
 __all__ = ["CLEAR_TIME", "SpeedReduction"]
@@ -131,12 +131,17 @@ class SpeedReduction:
     def __init__(self, model: ArmModel, used: bool) -> None:
         self._model = model
         if used:  # here, so that no touch waits for it
-            from coneskin.robot.guard.signals.joint_current import JointCurrentMonitor
+            from coneskin.robot.guard.signals.joint_current import (
+                MAX_UNEXPLAINED,
+                OutsideTorque,
+                ResistanceMonitor,
+            )
             from coneskin.robot.reaction.contact_supervision import ContactApproach
 
-            self._approach_of, self._monitor_of = ContactApproach, JointCurrentMonitor
+            self._approach_of, self._torque_of, self._monitor_of = ContactApproach, OutsideTorque, ResistanceMonitor
+            self._tolerance = MAX_UNEXPLAINED  # at any speed and acceleration: none was learned
         self.approach: ContactApproach | None = None
-        self._currents: JointCurrentMonitor | None = None
+        self._resistance: tuple[OutsideTorque, ResistanceMonitor] | None = None
         self._held = ""  # why the arm counts as held by something
         self.slider: float | None = None
         self._read_at = -math.inf
@@ -193,7 +198,9 @@ class SpeedReduction:
         budget = limits.stop_budget(state.speed, reaction.deceleration)
         longest, slow = reaction.time_budget, reaction.slow_speed
         self.now = _ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
-        self.approach, self._currents, self._held = approach, self._monitor_of(), ""
+        torque = self._torque_of()
+        self._resistance = torque, self._monitor_of(self._model, torque, True, self._tolerance)
+        self.approach, self._held = approach, ""
         out.append(SetSpeedSlider(self.now.fraction))
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
         return True
@@ -203,8 +210,11 @@ class SpeedReduction:
         if self.now is not None and self.approach is not None:
             self.approach.update(state.q, state.qd, contacts)
             self.now.sample(state.time, self.approach.speed, self.approach.certain)
-            if self._currents is not None and contacts and not self._held:
-                self._held = self._currents.resistance(state)
+            if self._resistance is not None and contacts and not self._held:
+                torque, resistance = self._resistance
+                torque.feed(state, False)
+                if torque.now is not None:
+                    self._held = resistance.resistance(state.q, contacts)
 
     def poll(self, time: float, touched: bool) -> str:
         """Return why the arm has to be stopped after all. Empty where it has not."""

@@ -69,6 +69,7 @@ rate_hz = 500
 kind = "{reaction}"
 deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: docs/safety.md
 distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
+bare_side = "fast"            # upper arm and wrists have no skin, and lead: nothing is there in this simulation
 
 [monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
 skin_silence_ms = 1000

@@ -50,6 +50,7 @@ def build_core(
     from coneskin.robot.guard.signals.contact import GuardedSensor
 
     limits, stream = scene.monitoring_limits, build_stream(scene, detector)
+    placed = place_on_arm(scene) if placed is None else placed
     levels = {item.sensor.name: item.sensor.thresholds for item in scene.sensors}
     tables = {item.sensor.name: item.sensor.force_table for item in scene.sensors}
     sensors = [
@@ -57,10 +58,10 @@ def build_core(
             *(item.name, item.link_name, item.link, item.place, at.touch_level, at.location_level),
             force=None if (table := tables[item.name]) is None else table.force,
         )
-        for item in (place_on_arm(scene) if placed is None else placed)
+        for item in placed
         for at in (levels[item.name],)
     ]
-    return GuardCore(stream, sensors, limits, _arm(scene) if scene.arm else None, withheld_motion(scene))
+    return GuardCore(stream, sensors, limits, _arm(scene, placed) if scene.arm else None, withheld_motion(scene))
 
 
 def build_stream(scene: Scene, detector: Mapping[str, Any] | None = None) -> TouchStream:
@@ -82,7 +83,7 @@ def withheld_motion(scene: Scene) -> str:
     return scene.commissioning.note if scene.commissioning else "nobody has looked for a commissioning record"
 
 
-def _arm(scene: Scene) -> ArmSupervisor:
+def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     from coneskin.robot.arm.models import arm_model
     from coneskin.robot.driver.registry import load_driver
     from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
@@ -99,7 +100,7 @@ def _arm(scene: Scene) -> ArmSupervisor:
         paths = tuple(path for path in paths if path is not StopPath.SLIDER)
     if rules.kinds - {"stop"}:
         _compile_links(scene, arm)
-    planner = _planner(scene, arm) if rules.move else None
+    planner = _planner(scene, arm, placed) if rules.move else None
     heartbeat = None
     if scene.arm.control == "external":
         from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
@@ -149,13 +150,15 @@ def _angle(a: Vector, b: Vector) -> float:
     return 2.0 * math.asin(min(1.0, 0.5 * math.dist(a, b)))
 
 
-def _planner(scene: Scene, arm: ArmModel) -> ReactionPlanner:
+def _planner(scene: Scene, arm: ArmModel, placed: Sequence[SensorOnArm]) -> ReactionPlanner:
     from coneskin.robot.arm.workspace import TablePlane
     from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
+    from coneskin.robot.reaction.bare_side import BareSides
 
     assert scene.arm is not None
     table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)
-    return ReactionPlanner(arm, scene.arm.watchdog_hz if scene.arm.control == "external" else None, table)
+    watchdog = scene.arm.watchdog_hz if scene.arm.control == "external" else None
+    return ReactionPlanner(arm, watchdog, table, BareSides(arm, [(item.link, item.frustum) for item in placed]))
 
 
 def _compile_links(scene: Scene, arm: ArmModel) -> None:

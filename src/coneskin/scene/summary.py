@@ -24,6 +24,14 @@ _HEARTBEAT_WORDS = {
 }
 
 
+#: reaction.bare_side -> what it means
+_BARE_WORDS = {
+    "stop": "; not towards what no skin covers",
+    "allowed": "; TOWARDS WHAT NO SKIN COVERS at up to 20 mm/s",
+    "fast": "; TOWARDS WHAT NO SKIN COVERS as fast as elsewhere",
+}
+
+
 def missing_parts(scene: Scene) -> list[str]:
     """Return what has to be added before the scene can be guarded, one line each."""
     needed = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
@@ -120,6 +128,7 @@ def _reaction(reaction: Reaction) -> str:
         f"{reaction.kind}: stop, {stop}, then at most {1e3 * reaction.distance:g} mm at up to "
         f"{1e3 * reaction.speed:g} mm/s within {reaction.time_budget:g} s, no point of the arm farther than "
         f"{1e3 * reaction.arm_distance:g} mm or faster than {1e3 * reaction.arm_speed:g} mm/s"
+        + _BARE_WORDS[reaction.bare_side]
     )
     if reaction.kind == "comply":
         return f"{text}, with full speed at level {reaction.full_level:g}"

@@ -27,7 +27,7 @@ HAND = BodyScene("hand", (-0.192, -0.120, 0.5875), radius=0.04, mass=0.6, stiffn
 
 
 def scene_of(kind: str, more: str = "") -> Scene:
-    return commissioned(parse_scene(forearm_scene(reaction=f'kind = "{kind}"\n{more}')))
+    return commissioned(parse_scene(forearm_scene(reaction=f'kind = "{kind}"\nbare_side = "fast"\n{more}')))
 
 
 def collide(scene: Scene, body: BodyScene = HAND, **options: object) -> CollisionRun:

@@ -50,7 +50,7 @@ def test_a_slow_arm_that_something_holds_is_stopped():
     rig.arm.current = [0.0, 2.1, 0.0, 0.0, 0.0, 0.0]
     rig.run(0.1)
     assert rig.event("stopping").details["why"] == (
-        "while slow, joint 2 takes 2.1 A more than expected: something resists it"
+        "while slow, joint 2 takes 25.2 N m more than its touches explain: something resists it"
     )
 
 

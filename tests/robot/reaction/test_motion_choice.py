@@ -12,6 +12,7 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import TablePlane, Workspace, skeleton
+from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
@@ -37,11 +38,16 @@ def ramped(qd, wanted, most):
     return tuple(a + share * (b - a) for a, b in zip(qd, wanted, strict=True))
 
 
+def pushed(q, force=1000.0):
+    """Torques on the joints of a push on the forearm [N m]; so strong a one bounds nothing."""
+    return tuple(force * turn for turn in push_torque(ARM, q, FOREARM))
+
+
 def follow(step, q=Q, time=0.0, longest=5.0):
     """An arm that does as it is told; the states on the way, and how it ended."""
     qd, states = ZERO_VELOCITY, []
     while time < longest:
-        state = ArmState(time, q, qd)
+        state = ArmState(time, q, qd, pushed(q))
         states.append(state)
         now = step(state)
         if isinstance(now, Done):
@@ -114,6 +120,38 @@ def test_however_it_is_pushed_it_moves_away_and_no_farther_than_allowed(levels):
     assert over.progress == pytest.approx(made, abs=1e-3)  # progress is along the way, ``made`` along the first normal
 
 
+@pytest.mark.promise("P38")
+@given(st.lists(st.tuples(*[st.floats(-60.0, 60.0)] * 6), min_size=4, max_size=12), st.floats(0.0, 5.0))
+@settings(max_examples=40)
+def test_whatever_acts_on_the_joints_it_never_drives_against_it(torques, doubt):
+    """The law: the torque from outside does work on the arm, never the arm on what presses, whatever the skin reads."""
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply", speed=0.2))
+    for k, torque in enumerate(torques, 1):
+        step = motion.update(ArmState(0.05 * k, Q, torque=torque, doubt=(doubt,) * 6), [FOREARM])
+        if isinstance(step, Done):
+            return
+        power = sum(t * v for t, v in zip(torque, step.qd, strict=True))
+        assert power >= 0.0
+        if step.away > 0.0:
+            assert step.away <= power / step.away / 1500.0 + 1e-12
+
+
+def test_a_push_that_something_else_carries_off_is_followed_no_more():
+    """The level does not fall, so it is no lighter touch: half of 60 N, or 15 of 20 N, and the arm rests."""
+    for force, left, moves in ((60.0, 40.0, True), (60.0, 29.0, False), (20.0, 6.0, True), (20.0, 4.0, False)):
+        motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply", speed=0.2))
+        for time, push in ((0.1, force), (0.3, left)):
+            step = motion.update(ArmState(time, Q, torque=pushed(Q, push)), [FOREARM])
+        assert (step.away > 0.0) is moves, (force, left)
+    lighter = replace(FOREARM, level=FOREARM.level - 0.05)
+    assert motion.update(ArmState(0.4, Q, torque=pushed(Q, 4.0)), [lighter]).away > 0.0
+
+
+def test_without_motor_currents_it_does_not_give_way():
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
+    assert "sends no motor currents" in motion.update(ArmState(0.1, Q), [FOREARM]).reason
+
+
 def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
     states, over = follow(comply(lambda t: 0.05 if t < 0.1 else None))
     assert states[-1].q == Q
@@ -124,7 +162,7 @@ def test_no_push_no_motion_and_the_end_of_the_push_is_the_end():
 def test_a_push_whose_place_is_not_known_holds_the_arm():
     motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply"))
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
-    step = motion.update(ArmState(0.1, Q), [FOREARM, lost])
+    step = motion.update(ArmState(0.1, Q, torque=pushed(Q)), [FOREARM, lost])
     assert step.qd == ZERO_VELOCITY
     assert step.clipped_by == ("place",)
     assert motion.plan is None
@@ -141,13 +179,14 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
         return motion
 
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
-    step = complying(0.1).update(ArmState(0.002, Q), [lost])
+    state = ArmState(0.002, Q, torque=pushed(Q))
+    step = complying(0.1).update(state, [lost])
     assert (step.qd, step.acceleration) == (ZERO_VELOCITY, 12.0)
     x, y, z = FOREARM.normal
     other = replace(FOREARM, normal=(-x, -y, -z), level=0.9, number=2)
-    step = complying(0.1).update(ArmState(0.002, Q), [FOREARM, other])
+    step = complying(0.1).update(state, [FOREARM, other])
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 12.0, ("opposed",))
-    step = complying(0.0).update(ArmState(0.002, Q), [replace(FOREARM, level=0.1, threshold=0.1)])
+    step = complying(0.0).update(state, [replace(FOREARM, level=0.1, threshold=0.1)])
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 4.0, ("level",))
 
 

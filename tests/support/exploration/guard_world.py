@@ -26,7 +26,9 @@ from coneskin.robot.driver.values import (
 )
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, encode_loss
+from coneskin.robot.reaction.types import ContactOnLink
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.scene.build import build_core, place_on_arm
 from coneskin.scene.reader import parse_scene
@@ -43,8 +45,8 @@ __all__ = ["CONTROLS", "INVARIANTS", "PROGRESS", "REACTIONS", "GuardWorld", "Set
 REACTIONS = {
     "stop": 'kind = "stop"',
     "slow": 'kind = "slow"\ntime_budget_s = 1\npress_mm = 50',
-    "comply": 'kind = "comply"\ndistance_mm = 20',
-    "retreat": 'kind = "retreat"\ndistance_mm = 20',
+    "comply": 'kind = "comply"\ndistance_mm = 20\nbare_side = "allowed"',
+    "retreat": 'kind = "retreat"\ndistance_mm = 20\nbare_side = "allowed"',
 }
 CONTROLS = ("internal", "external")
 _SENSOR_TEXT = """\
@@ -82,6 +84,7 @@ _BRIEF = 16  # cycles at least of a wait for a change: 0.16 s
 _CLOCK_CYCLES = 1200  # in which a reset is over, and states that were late since their clock stood still are in time
 _LONG, _VERY_LONG = 80, 250  # cycles in which something has to change by itself: 0.8 s, and 2.5 s while it decides
 _SPEED = 0.3  # rad/s; of the arm's program
+_PUSH = 200.0  # N; of a touch that a complying arm follows
 _LIMITS = {"skin": 0.05, "controller": 0.05, "program": 0.15, "process": 0.2}
 _MARGIN = 0.045  # s; a frame or two, and the period of what is heard
 _STAND_TIME = 1.5  # s in which an arm that stands is latched: a place may take 0.3 s, a watch 0.7 s
@@ -470,6 +473,8 @@ class GuardWorld:
             self._take(block)
         if wrong.line != "lost":
             self._feed_skin()
+        if self.settings.reaction == "comply":
+            arm.current = self._held()
         clock = arm.clock
         for _ in range(5):
             arm.update()
@@ -485,6 +490,16 @@ class GuardWorld:
         else:
             self._feed(BlockKind.TICK, b"")
         self._look()
+
+    def _held(self) -> list[float]:
+        """Return the currents that hold the arm against what pushes it [A]: a complying arm follows only these."""
+        q, torque = tuple(self.arm.q), [0.0] * 6
+        for shows, at in zip((self.wrong.skin, self.wrong.other), _parts(self.settings)[1], strict=False):
+            if shows != "free":
+                assert at.model is not None
+                pushed = push_torque(at.model, q, ContactOnLink(at.link, *at.place(*_PLACE)))  # type: ignore[arg-type]
+                torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
+        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
 
     def _feed_skin(self) -> None:
         wrong = self.wrong

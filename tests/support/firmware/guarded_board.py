@@ -24,6 +24,8 @@ def board_scene(host: str, port: str) -> Scene:
         host: of the simulated controller.
         port: of the board.
     """
-    text = forearm_scene(host, port=port, reaction='kind = "retreat"\ndistance_mm = 30', limits=_LIMITS)
+    text = forearm_scene(
+        host, port=port, reaction='kind = "retreat"\ndistance_mm = 30\nbare_side = "fast"', limits=_LIMITS
+    )
     text = text.replace("xyz_mm =", f"{_SENSOR}\nxyz_mm =").replace("[arm]", "[arm]\nwatchdog_hz = 1")
     return commissioned(parse_scene(text.replace('kind = "serial"', f'kind = "serial"\nbaud = {_BAUD}')))

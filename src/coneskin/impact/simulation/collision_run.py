@@ -36,7 +36,7 @@ from coneskin.skin.virtual.skin import PressedSkin
 
 from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
 from .mujoco_plant import MujocoPlant
-from .scene_plant import currents_of, presses_of, sheets_of
+from .scene_plant import bare_parts_of, currents_of, presses_of, sheets_of
 
 __all__ = ["PROTECTIONS", "CollisionRun", "follow_waypoints"]
 
@@ -118,6 +118,8 @@ class CollisionRun:
         seed: of the skins' noise.
         sheets: model of the skins' sheets, "ladder" or "field".
         heeds: True where what moves the arm obeys the speed slider; a stream of servo setpoints does not.
+        bare: True where bodies also meet what of the arm has no skin.
+        period: as of `MujocoPlant`.
         note: is told each block that the guard takes, each event that it makes, the force of the contacts, where
             the bodies are, and which skin they touch, for a recording.
 
@@ -141,12 +143,15 @@ class CollisionRun:
         seed: int = 0,
         sheets: str = "ladder",
         heeds: bool = True,
+        bare: bool = False,
+        period: int = 1,
         note: Callable[[Block], None] = lambda _: None,
     ) -> None:
         assert scene.arm is not None
         model = arm_model(scene.arm.model)
         self._skins = sheets_of(scene)
-        self.plant = MujocoPlant(model, self._skins, bodies, scene.padding or Padding(), q)
+        without = bare_parts_of(scene) if bare else ()
+        self.plant = MujocoPlant(model, self._skins, bodies, scene.padding or Padding(), q, period=period, bare=without)
         self.arm = MockArm(list(q), [0.0] * 6, heeds=heeds)
         self.meter = ImpactMeter()
         self.events: list[GuardEvent] = []
@@ -171,13 +176,25 @@ class CollisionRun:
         """Outcome so far."""
         return self.meter.outcome
 
-    def run(self, program: _JointProgram, longest: float = 3.0, after: float = _SETTLE_TIME) -> ImpactOutcome:
+    @property
+    def latched(self) -> bool:
+        """True while the guard holds the arm latched."""
+        return self._core is not None and self._core.phase is Phase.LATCHED
+
+    def run(
+        self,
+        program: _JointProgram,
+        longest: float = 3.0,
+        after: float = _SETTLE_TIME,
+        look: Callable[[], bool] = lambda: False,
+    ) -> ImpactOutcome:
         """Wait until the guard is active, let the program move the arm, and see what comes of it.
 
         Args:
             program: that moves the arm until the guard does.
             longest: for which to look on [s]; it is over 0.5 s after the first contact.
             after: for which to go on then, to see what comes later [s].
+            look: is called after each step, and ends the run where it returns True.
 
         Returns:
             the outcome; that of no contact has a peak of 0.
@@ -191,6 +208,8 @@ class CollisionRun:
         left = math.inf
         while self.now - self._began < longest and left > 0.0:
             self._step()
+            if look():
+                break
             if self.meter.over:
                 left = min(left, after) - _STEP_TIME
         return self.outcome

@@ -180,6 +180,11 @@ class ImpactMeter:
             self._stood = time
         self._now = time
 
+    @property
+    def noticed(self) -> bool:
+        """True once the first command of what protects the body came."""
+        return not math.isnan(self._noticed)
+
     def notice(self, time: float) -> None:
         """Take the first command of what protects the body [s]."""
         if math.isnan(self._noticed):

@@ -75,6 +75,7 @@ class _HeldPart:
         return True
 
 
+_BARE_LINK = Padding(1e-3, 2e5, 1e6)  # lacquer on metal, and the skin of what touches it; assumed
 STEP = 2e-4  #: s of the integration; the stiffest contact, 1e6 N/m against 0.3 kg, swings with 1800 rad/s
 _CONTACT_RANGE = 0.002  # m between surfaces that may meet before the next look; as far as MuJoCo reports it
 _ARM_DOF = 6  # degrees of freedom of the arm, the first ones
@@ -105,6 +106,7 @@ class Touch(NamedTuple):
     normal: Floats
     point: Floats
     jacobian: Floats  #: of the point, for the arm's joints, 3 x 6
+    bare: bool = False  #: no skin is there
 
 
 class MujocoPlant:
@@ -115,6 +117,7 @@ class MujocoPlant:
         sheets: its skins.
         bodies: around it.
         padding: of the skins.
+        bare: parts of the arm without a skin, which are as hard as a strip that a sheet leaves bare.
         q: joint positions at the beginning [rad].
         qd: joint speeds then [rad/s].
         step: of the integration [s].
@@ -144,6 +147,7 @@ class MujocoPlant:
         qd: Sequence[float] = (0.0,) * _ARM_DOF,
         step: float = STEP,
         period: int = 1,
+        bare: Sequence[SheetOnLink] = (),
     ) -> None:
         try:
             import mujoco
@@ -152,10 +156,11 @@ class MujocoPlant:
         self._mj: Any = mujoco
         mujoco.set_mju_user_warning(lambda _: None)  # it would write a file into the current folder: see `diverged`
         inertia = arm_inertia(model)
+        self._skins, sheets = len(sheets), (*sheets, *bare)
         self._m: Any = mujoco.MjModel.from_xml_string(describe_scene(model, inertia, q, sheets, bodies, step))
         self._d: Any = mujoco.MjData(self._m)
         self._padding = padding
-        self._sheets = tuple(sheets)
+        self._sheets = sheets
         self._back = [body_link(model, sheet.link).inverse() for sheet in sheets]
         self._links = [self._m.body(f"link{sheet.link}").id for sheet in sheets]
         self._sheet_of = {self._m.geom(f"sheet{n}").id: n for n in range(len(sheets))}
@@ -274,7 +279,7 @@ class MujocoPlant:
 
     def _press(self, near: Sequence[tuple[Touch, Floats]], depths: list[float]) -> None:
         """Put the forces of the contacts on skins and bodies, and let people act; the depths grow with the speeds."""
-        d, step, padding = self._d, self._step, self._padding
+        d, step = self._d, self._step
         applied, velocity = d.qfrc_applied, d.qvel
         applied[:] = 0.0
         felt: dict[int, Touch] = {}
@@ -283,12 +288,12 @@ class MujocoPlant:
             depths[number] += rate * step
             if depth <= 0.0:
                 continue
-            force = padding.force(depth, rate)
+            force = self._law(touch).force(depth, rate)
             applied -= force * row
             self.impulse += force * step
             self.deepest, self.peak = max(self.deepest, depth), max(self.peak, force)
             if self._period == 1:
-                self.lost += (force - padding.elastic(depth)) * rate * step
+                self.lost += (force - self._law(touch).elastic(depth)) * rate * step
             self._touched.setdefault(self._body_numbers[touch.part], self.time)
             if touch.part not in felt or felt[touch.part].force < force:
                 felt[touch.part] = touch._replace(force=force)
@@ -350,14 +355,28 @@ class MujocoPlant:
         if (at := self._address[part]) is not None:
             speed -= self._d.qvel[at : at + 3]
         rate = float(speed @ normal)
-        return Touch(sheet, part, depth, rate, self._padding.force(depth, rate), normal, point, jacobian)
+        touch = Touch(sheet, part, depth, rate, 0.0, normal, point, jacobian, self._is_bare(sheet, point))
+        return touch._replace(force=self._law(touch).force(depth, rate))
+
+    def _is_bare(self, sheet: int, point: Floats) -> bool:
+        """Tell whether a point of the base frame [m] lies where there is no skin."""
+        frustum = self._sheets[sheet].cone.frustum
+        if sheet >= self._skins or frustum.wrap == math.tau:
+            return sheet >= self._skins
+        return self._locate(sheet, point)[1] > frustum.wrap
+
+    def _law(self, touch: Touch) -> Padding:
+        return _BARE_LINK if touch.bare else self._padding
+
+    def _locate(self, sheet: int, point: Floats) -> Vector:
+        link = self._links[sheet]
+        axes = self._d.xmat[link].reshape(3, 3)
+        x, y, z = (axes.T @ (point - self._d.xpos[link])).tolist()
+        u, phi, distance = self._sheets[sheet].cone.locate(self._back[sheet].apply((x, y, z)))
+        return u, phi % math.tau, distance
 
     def _contact(self, touch: Touch) -> _BodyContact:
-        link = self._links[touch.sheet]
-        axes = self._d.xmat[link].reshape(3, 3)
-        x, y, z = (axes.T @ (touch.point - self._d.xpos[link])).tolist()
-        at = self._back[touch.sheet].apply((x, y, z))
-        u, phi, _ = self._sheets[touch.sheet].cone.locate(at)
+        u, phi, _ = self._locate(touch.sheet, touch.point)
         px, py, pz = touch.point.tolist()
         nx, ny, nz = touch.normal.tolist()
         return _BodyContact(

@@ -144,6 +144,9 @@ _REACTION_SETTINGS = with_meanings(
     arm_distance_mm: distance that no point of the bare arm goes from where the retreat began. The tool is not
         known. Points farther out from the joints that turn go farther than the touched point. So a retreat from a
         touch near a joint mostly ends here, before `distance_mm`
+    bare_side: whether a retreat, or giving way, may move outward what no skin covers. With "stop" the arm then only
+        stops. With "allowed" no bare point is faster than 20 mm/s, and only the motor currents feel what it meets. With
+        "fast" it is as fast as elsewhere: only where nothing can be there
     full_level: level of the touch at which comply gives way with all of `speed_mm_s`
     slow_to: position of the controller's speed slider while slow
     slow_speed_mm_s: speed of the touched surface below which the arm counts as slow, whatever it was before. From
@@ -158,6 +161,7 @@ _REACTION_SETTINGS = with_meanings(
     Key("time_budget_s", float, None, low=0.05, high=60.0),
     Key("arm_speed_mm_s", float, None, low=1.0, high=5000.0),
     Key("arm_distance_mm", float, None, low=1.0, high=2000.0),
+    Key("bare_side", str, None, choices=("stop", "allowed", "fast")),
     Key("full_level", float, None, low=0.01, high=1.0),
     Key("slow_to", float, None, low=0.05, high=0.9),
     Key("slow_speed_mm_s", float, None, low=1.0, high=1500.0),

@@ -6,43 +6,95 @@ import pytest
 
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.signals.joint_current import MAX_RISE, JointCurrentMonitor
-from coneskin.robot.reaction.types import Reaction
-from tests.support.guard_rig import GuardRig, touch
+from coneskin.robot.guard.signals.joint_current import (
+    MAX_UNEXPLAINED,
+    TORQUE_PER_AMPERE,
+    OutsideTorque,
+    ResistanceMonitor,
+    push_torque,
+)
+from coneskin.robot.reaction.types import ContactOnLink, Reaction
+from tests.support.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
 
 ZEROS = (0.0,) * 6
+Q = tuple(START_Q)
+TOUCH = ContactOnLink(LINK, CONE.point(0.13, 1.57), CONE.normal(1.57), 0.6, True, 0.1, 1)
 
 
-def state(current, target=ZEROS):
-    return ControllerState(0.0, 0.0, ZEROS, ZEROS, True, False, True, current, target)
+def state(torque, target=ZEROS):
+    """A state whose motors hold a torque from outside [N m]."""
+    current = None
+    if target is not None:
+        current = tuple(a - t / k for a, t, k in zip(target, torque, TORQUE_PER_AMPERE, strict=True))
+    return ControllerState(0.0, 0.0, Q, ZEROS, True, False, True, current, target)
 
 
-def off(joint, current):
-    return state(tuple(current if i == joint else 0.0 for i in range(6)))
+def push(force, contact=TOUCH):
+    return [force * turn for turn in push_torque(MODEL, Q, contact)]
 
 
-def told(monitor, *states):
-    return [bool(monitor.resistance(each)) for each in states]
+class Monitored:
+    """An arm that learns while nothing touches, and is then watched."""
+
+    def __init__(self, *usual, yields=False):
+        self.torque = OutsideTorque()
+        for torque in usual or [ZEROS]:
+            self.torque.feed(state(torque), True)
+        self.monitor = ResistanceMonitor(MODEL, self.torque, yields)
+
+    def told(self, *torques):
+        found = []
+        for torque in torques:
+            self.torque.feed(state(torque), False)
+            found.append(bool(self.monitor.resistance(Q, [TOUCH])))
+        return found
 
 
-@pytest.mark.parametrize("joint", range(6))
-def test_a_rise_counts_after_a_few_samples_and_below_its_limit_never(joint):
-    above, below = MAX_RISE[joint] + 0.1, MAX_RISE[joint] - 0.1
-    monitor = JointCurrentMonitor()
-    assert not any(told(monitor, off(joint, 0.0), *[off(joint, below)] * 50, *[off(joint, -below)] * 50))
-    assert told(monitor, *[off(joint, above)] * 4, off(joint, 0.0), *[off(joint, -above)] * 5) == [False] * 9 + [True]
+def one(joint, torque):
+    return [torque if i == joint else 0.0 for i in range(6)]
 
 
-def test_a_push_that_fades_is_none_and_one_from_the_other_side_is():
-    monitor = JointCurrentMonitor()
-    assert not any(told(monitor, *[off(0, 5.0)] * 20, *[off(0, 5.0 - 0.1 * k) for k in range(50)]))
-    assert any(told(monitor, *[off(0, -2.5)] * 5))
+@pytest.mark.parametrize("joint", range(3, 6))
+def test_what_no_touch_explains_counts_after_a_few_samples_and_below_its_limit_never(joint):
+    arm = Monitored()
+    assert not any(arm.told(ZEROS, *[one(joint, 1.4)] * 50, *[one(joint, -1.4)] * 50))
+    assert arm.told(one(joint, 1.6), one(joint, 1.6), ZEROS, *[one(joint, -1.6)] * 3) == [False] * 5 + [True]
 
 
-def test_what_the_controller_expects_is_no_resistance():
-    monitor = JointCurrentMonitor()
-    assert not any(told(monitor, *[state((0.1 * k,) * 6, (0.1 * k,) * 6) for k in range(100)]))
-    assert not any(told(monitor, *[state(None, None)] * 10))
+@pytest.mark.parametrize("yields", [False, True])
+def test_a_touch_explains_its_own_force_and_no_other(yields):
+    arm = Monitored(yields=yields)
+    assert not any(arm.told(*[push(200.0)] * 5, *[push(200.0 - 4.0 * k) for k in range(50)]))
+    assert any(arm.told(*[push(-25.0)] * 5)), "a body behind presses against the touch"
+
+
+def test_a_push_that_grows_is_what_giving_way_follows_and_ends_a_retreat():
+    growing = [push(5.0 * k) for k in range(1, 40)]
+    assert not any(Monitored(yields=True).told(*growing))
+    assert any(Monitored().told(*growing))
+
+
+def test_friction_is_learned_before_and_never_excuses_more_than_the_most():
+    usual = [one(1, 6.0 * math.sin(0.3 * k)) for k in range(400)]
+    arm = Monitored(*usual)
+    assert not any(arm.told(ZEROS, *usual[:50]))
+    assert any(arm.told(*[one(1, MAX_UNEXPLAINED[1] + 1.0)] * 5))
+    wild = Monitored(*[one(1, 100.0 * math.sin(0.3 * k)) for k in range(400)])
+    assert wild.torque.tolerance == (3.0, MAX_UNEXPLAINED[1], 3.0, 1.5, 1.5, 1.5)
+
+
+def test_a_payload_that_was_set_wrong_is_no_push():
+    usual = one(1, 15.0)
+    arm = Monitored(*[usual] * 3)
+    assert not any(arm.told(*[usual] * 50))
+    assert arm.torque.now == pytest.approx(ZEROS)
+
+
+@pytest.mark.promise("P32")
+def test_without_currents_nothing_moves_away():
+    arm = Monitored()
+    arm.torque.feed(state(ZEROS, None), False)
+    assert "sends no motor currents" in arm.monitor.resistance(Q, [TOUCH])
 
 
 def resisted(joint=1, current=3.0):
@@ -63,12 +115,6 @@ def resisted(joint=1, current=3.0):
 @pytest.mark.promise("P32")
 def test_a_retreat_that_a_force_resists_beside_the_skin_ends_at_once():
     rig, way = resisted()
-    assert rig.event("retreated").details["why"] == "joint 2 takes 3.0 A more than expected: something resists it"
+    assert rig.event("retreated").details["why"].endswith(" N m more than its touches explain: something resists it")
     assert rig.core.phase is Phase.LATCHED
     assert way < 0.006
-
-
-def test_a_current_that_the_motion_needs_does_not_end_it():
-    rig = GuardRig(touch(0.5), reaction=Reaction("retreat", distance=0.03), speed=0.5).run(0.5)
-    rig.arm.current = [1.5, -1.5, 1.5, 0.8, -0.8, 0.8]
-    assert rig.run(1.0).event("retreated").details["complete"] is True
