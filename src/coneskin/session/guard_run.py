@@ -7,6 +7,7 @@ import errno
 import os
 import signal
 import socket
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -27,6 +28,7 @@ from coneskin.skin.sources.source import SourceReopening
 __all__ = ["run_guard"]
 
 _LOCK_TIMEOUT = 3.0  # s for the guard of a program that was killed to stop its arm and end
+_CREDENTIALS = struct.Struct("3i")  # ucred of unix(7): process, user, group
 _LOCK_PERIOD = 0.05  # s
 
 
@@ -51,22 +53,34 @@ def _arm_lock(
     if sys.platform != "linux":
         yield
         return
-    end = clock() + timeout
+    end, name = clock() + timeout, f"\0coneskin guard of {_address(host)}"
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
         while True:
             try:
-                sock.bind(f"\0coneskin guard of {_address(host)}")
+                sock.bind(name)
+                sock.listen(1)  # so that who is refused can ask whose it is
                 break
             except OSError as exc:
                 if exc.errno != errno.EADDRINUSE:  # a system without such names has no lock
                     break
             if clock() >= end:
                 raise RobotRefused(
-                    f"another guard on this computer has the arm at {host}: end that program, or that coneskin guard, "
-                    "first"
+                    f"another guard on this computer has the arm at {host}, {_holder(name)}: end that program, or that "
+                    "coneskin guard, first"
                 )
             wait(_LOCK_PERIOD)
         yield
+
+
+def _holder(name: str) -> str:
+    """Return who holds a lock, as the system knows it: its name alone says nothing, because any user can take it."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
+        try:
+            sock.connect(name)
+            pid, uid, _ = _CREDENTIALS.unpack(sock.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size))
+        except OSError:
+            return "or a program that is none and has taken its name (see it in /proc/net/unix)"
+    return f"process {pid} of user {uid}{'' if uid == os.getuid() else ', who is not you'}"
 
 
 def _address(host: str) -> str:
