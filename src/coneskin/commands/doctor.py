@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
+_HOLD_UP_TIME = 10.0  # s
 _VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
 
 
@@ -77,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
     def ask(words: str) -> None:
         print(f"       >>  {words}", file=sys.stderr, flush=True)
 
-    doctor = Doctor(scene, tell, ask, not args.no_touches)
+    doctor = Doctor(scene, tell, ask, not args.no_touches, hold_up_time=_HOLD_UP_TIME)
     if args.measured:
         from coneskin.robot.ur.measured import compare, read_measured
 

@@ -23,6 +23,7 @@ from coneskin.scene.suspicions import suspicions
 from coneskin.skin.sources.kinds import is_simulated, open_source
 
 from .guided_touches import examine_touches, guided_touches
+from .hold_ups import begin_measurement, examine_hold_ups
 from .skin_examination import SkinStatistics, examine_line, examine_sensor
 from .wires import WirePatch, examine_wires
 
@@ -62,6 +63,7 @@ class Doctor:
         tell: called with each finding as it is made.
         ask: called with what a person is asked to do.
         touches: False to leave the guided touches out.
+        hold_up_time: for which the hold-ups of this computer are measured [s]; 0 to leave them out.
         clock: monotonic [s].
 
     Attributes:
@@ -76,14 +78,25 @@ class Doctor:
         ask: Callable[[str], None] = lambda _: None,
         touches: bool = True,
         clock: Callable[[], float] = time.monotonic,
+        hold_up_time: float = 0.0,
     ) -> None:
         self.scene = scene
         self.findings: list[Finding] = []
         self.patches: list[WirePatch] = []
         self._tell, self._ask, self._touches, self._clock = tell, ask, touches, clock
+        self._hold_up_time = hold_up_time
 
     def examine(self) -> None:
-        """Examine everything that the scene names."""
+        """Examine everything that the scene names, and meanwhile the computer."""
+        with ExitStack() as stack:
+            measurement = None
+            if self._hold_up_time:
+                measurement = stack.enter_context(begin_measurement(self._hold_up_time))
+            self._examine_scene()
+            if measurement is not None:
+                self.note(examine_hold_ups(measurement))
+
+    def _examine_scene(self) -> None:
         self.note(*_packages(self.scene))
         self.note(*(one for one in suspicions(self.scene) if one.item != "packages"))
         self._examine_source()
