@@ -37,6 +37,7 @@ _MIN_FRAMES = 8
 _STUCK_FRAMES = 400  # in a row with the same reading
 _REMARKABLE_SHARE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
 _UNTOUCHED_SHARE = 0.03  # of the supply, on both guides of the touch phase together
+_REMARKABLE_HUM = 0.004  # of the supply, on a guide; it moves a place by as much of the sheet
 _NEAR_SHARE = 0.06  # a reading is another one
 _FULL_SCALES = (255, 1023, 4095, 16383, 65535)
 _STATUS_NAMES = {
@@ -211,7 +212,7 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Finding | None:
 
 
 def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
-    """Return which drive currents are remarkably far from the design's, though a guard takes them; a few words each.
+    """Return what is remarkable though a guard takes it, drive currents off the design's and hum; a few words each.
 
     Args:
         frames: of the sensor, in their order.
@@ -223,7 +224,23 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
         off = _middle(columns[k]) / max(expected[k], 1) - 1.0
         if abs(off) > _REMARKABLE_SHARE:
             found.append(f"{name} current {100.0 * off:+.0f} % of the design's: see coneskin doctor")
+    hum = _measure_hum(columns)
+    if hum > _REMARKABLE_HUM * expected[_SUPPLY_AT]:
+        found.append(f"guides swing by {hum:.0f} counts, as by mains: shield the wires, join the grounds")
     return found
+
+
+def _measure_hum(columns: _Columns) -> float:
+    """Return the amplitude of what swings on the untouched guides [counts]; they stand at 0, which cuts half of it."""
+    untouched = [
+        c + d < _UNTOUCHED_SHARE * s for c, d, s in zip(columns[0], columns[1], columns[_SUPPLY_AT], strict=True)
+    ]
+    most = 0.0
+    for k in _GUIDE_PLACES:
+        column = list(itertools.compress(columns[k], untouched))
+        if len(column) >= _MIN_FRAMES:
+            most = max(most, 2.0 * (sum(count * count for count in column) / len(column)) ** 0.5)
+    return most
 
 
 def _find_floating(columns: _Columns) -> Finding | None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -20,12 +20,15 @@ import numpy as np
 
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import SensorError
+from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import SheetTolerance
 
 from .circuit import ContactModel, LayerContact, Matrix
+from .field_contacts import FieldContacts
+from .ladder import ResistorLadder
 
-__all__ = ["BuiltSheets", "SheetFlaws", "draw_flaws"]
+__all__ = ["BuiltSheets", "SheetFlaws", "build_specimen", "draw_flaws"]
 
 _CELL_COUNT = 48  # of the mesh, along each side
 _BOND_SIEMENS = 200.0  # S for a whole electrode; silver on a film has milliohms
@@ -261,3 +264,24 @@ class BuiltSheets:
 
 
 _IDEAL_FLAWS = SheetFlaws(), SheetFlaws()
+
+
+def build_specimen(
+    sensors: Sequence[Sensor], tolerance: SheetTolerance, seed: int, model: str
+) -> tuple[list[Sensor], ContactModel]:
+    """Return sensors as they are built, with leads of their own, and the contact model of their sheets.
+
+    Args:
+        sensors: as their scene says.
+        tolerance: what their leads and sheets are drawn from.
+        seed: of that; the sheets of all are alike.
+        model: of the ideal sheets, "field" or "ladder".
+    """
+    rng = random.Random(f"leads {seed}")
+    built = []
+    for sensor in sensors:
+        parts = sensor.electronics
+        leads = LeadOhms(*(ohms + abs(rng.gauss(0.0, tolerance.lead)) for ohms in parts.lead_ohms))
+        built.append(replace(sensor, electronics=replace(parts, lead_ohms=leads)))
+    exact: ContactModel = FieldContacts() if model == "field" else ResistorLadder()
+    return built, BuiltSheets(draw_flaws(tolerance, seed), exact)

@@ -19,13 +19,24 @@ from typing import Any, BinaryIO
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS
 
+from .circuit import ContactModel
 from .fault_injection import FaultInjection
 from .imperfections import Imperfections
 from .scripted_touch import ScriptedTouch
 from .skin import MODELS, VirtualSkin
-from .typed_script import FAULT_NAMES, TOUCH_SHAPES, parse_fault, parse_press, read_script
+from .typed_script import (
+    ELECTRIC_FLAWS,
+    FAULT_NAMES,
+    FLAW_NAMES,
+    TOUCH_SHAPES,
+    parse_fault,
+    parse_flaw,
+    parse_press,
+    read_script,
+)
 
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "run"]
 
@@ -44,6 +55,9 @@ example:
 
   coneskin sim-skin --sensors 4 --touch 1:2:200:90@2 --script touches.txt
   Four sensors on one port; the third is touched, and whoever a line of touches.txt names, such as grip:3:4:200:90@1.
+
+  coneskin sim-skin --specimen film --flaw slope=0.05 --flaw mains_volts=0.02 --seed 3
+  A skin as it is built: film sheets whose resistance grows by 5 % along them (a standard deviation), hum on the guides.
 
   coneskin sim-skin --fault drop_every=50 --fault wiring=open-A --fault wiring_after=3000
   Lose one frame in 50, and break the wire of A after 3000 frames.
@@ -98,6 +112,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="field",
         help="the sheets: exact field, or ideal resistors (default field)",
     )
+    add(
+        "--specimen",
+        choices=tuple(SHEET_CLASSES),
+        default="ideal",
+        help="sheets as they are built, drawn by --seed from what their class is like: film is a good specimen, coated "
+        "a bad one (default ideal)",
+    )
+    add(
+        "--flaw",
+        action="append",
+        type=_argument(parse_flaw),
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"set one flaw of the specimen; may be repeated. Names: {', '.join(FLAW_NAMES)}. Of sheets, leads and "
+        "lines it is a standard deviation; warming is the growth of the upper sheet's resistance [1/s]",
+    )
     add("--noise-counts", type=float, default=0.7, help="standard deviation of each reading [counts] (default 0.7)")
     add("--leak-drift", type=float, default=0.0, help="growth of the leak between the layers [S/s] (default 0)")
     add(
@@ -128,6 +158,14 @@ def run(args: argparse.Namespace) -> int:
     if args.sensors < 1:
         raise SensorError(f"--sensors must be at least 1, got {args.sensors}")
     sensors = [Sensor(frustum, args.sensor + number, device_id=args.device) for number in range(args.sensors)]
+    flaws = dict(args.flaw)
+    own = {name: flaws[name] for name in ELECTRIC_FLAWS & flaws.keys()}
+    tolerance = replace(SHEET_CLASSES[args.specimen], **{k: v for k, v in flaws.items() if k not in own})
+    model: ContactModel | str = args.model
+    if tolerance != IDEAL_SHEETS:
+        from .built_sheets import build_specimen
+
+        sensors, model = build_specimen(sensors, tolerance, args.seed, args.model)
     names = {str(sensor.sensor_id): sensor.name for sensor in sensors}
     presses: list[tuple[str, ScriptedTouch]] = [*args.touch, *(read_script(args.script) if args.script else ())]
     touches = []
@@ -140,9 +178,14 @@ def run(args: argparse.Namespace) -> int:
         touches,
         rate_hz=args.rate_hz,
         seed=args.seed,
-        imperfections=Imperfections(noise_counts=args.noise_counts, leak_drift=args.leak_drift),
+        imperfections=Imperfections(
+            noise_counts=args.noise_counts,
+            leak_drift=args.leak_drift,
+            warming=(own.pop("warming", 0.0), 0.0),
+            **own,
+        ),
         faults=FaultInjection(**dict(args.fault)),
-        model=args.model,
+        model=model,
         duration=args.duration_s,
         frame_length=args.frame_length,
     )

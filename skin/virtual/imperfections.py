@@ -165,6 +165,10 @@ class Imperfections:
         layers: how the layers touch.
         supply_ratio: actual over nominal supply.
         clock_ratio: speed of the device clock over true time.
+        current_gain: what each drive current reads over what it is.
+        offset_counts: of every reading.
+        mains_volts: amplitude of 50 Hz on the guides [V].
+        warming: growth of the resistance of the upper and of the lower sheet, as by temperature [1/s].
 
     Raises:
         SensorError: settling_time, noise_counts or a conductance is negative, or larger than any can be.
@@ -178,6 +182,10 @@ class Imperfections:
     layers: ContactLaw = field(default_factory=ContactLaw)
     supply_ratio: float = 1.0
     clock_ratio: float = 1.0
+    current_gain: float = 1.0
+    offset_counts: float = 0.0
+    mains_volts: float = 0.0
+    warming: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.settling_time) and self.settling_time >= 0.0):

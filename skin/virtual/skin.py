@@ -26,6 +26,8 @@ __all__ = ["MODELS", "Press", "PressedSkin", "VirtualSkin"]
 
 MODELS = ("field", "ladder")
 _CURRENT_NAMES = frozenset({"touch_current", "radial_current", "angular_current"})  # the rest are potentials
+_GUIDE_NAMES = frozenset({"touch_c", "touch_d", "radial_c", "radial_d", "angular_a", "angular_b"})
+_MAINS_RATE = 2.0 * math.pi * 50.0  # rad/s
 _FORCE_DIGITS = 6  # decimals of a force [N]: far below a count, and a relaxing touch comes to rest
 _MAX_RATE = 1e6  # Hz; frames of a microsecond, the unit of the device clock
 _FRAMES_AHEAD = 8  # frames; solved at once while touches change
@@ -150,7 +152,7 @@ class VirtualSkin:
             for place, sensor in enumerate(self.sensors):
                 start = cycle * period + 3.0 * step * place
                 volts = self._volts(sensor, (start + step, start + 2.0 * step, start + 3.0 * step), index)
-                counts = self._convert(sensor, volts, rng)
+                counts = self._convert(sensor, volts, rng, start)
                 clock = int((start + step) * 1e6 * self.imperfections.clock_ratio) & 0xFFFFFFFF
                 head = (self.frame_length, sensor.device_id, sensor.sensor_id, 0, cycle & 0xFFFF, clock)
                 yield start + 3.0 * step, frame_of(head, counts)
@@ -175,10 +177,15 @@ class VirtualSkin:
         scenes = tuple(self._contacts(sensor, time) for time in times)
         leaks = tuple(self.imperfections.leak + self.imperfections.leak_drift * time for time in times)
         wiring = self.faults.wiring_at(index)
-        key = (scenes, leaks, wiring)
+        warm = self.imperfections.warming
+        grown = (warm[0] * times[0], warm[1] * times[0]) if any(warm) else warm
+        key = (scenes, leaks, wiring, grown)
         known = self._measured.get(sensor.name)
         if known is None or known[0] != key:
-            sheets = [_leaking(y, leak) for y, leak in zip(self._sheets(sensor, scenes, times), leaks, strict=True)]
+            sheets = [
+                _warmed(_leaking(y, leak), sensor, grown)
+                for y, leak in zip(self._sheets(sensor, scenes, times), leaks, strict=True)
+            ]
             known = (key, measure(sensor, sheets, wiring))
             self._measured[sensor.name] = known
         return known[1]
@@ -221,8 +228,8 @@ class VirtualSkin:
                     contacts.append(part)
         return tuple(contacts)
 
-    def _convert(self, sensor: Sensor, volts: ConverterInputs, rng: random.Random) -> dict[str, int]:
-        """Return the counts of the converter by field: settling, noise and rounding."""
+    def _convert(self, sensor: Sensor, volts: ConverterInputs, rng: random.Random, start: float) -> dict[str, int]:
+        """Return the counts of the converter by field: settling, mains, gain, offset, noise and rounding."""
         real, parts = self.imperfections, sensor.electronics
         values = volts._asdict()
         if real.settling_time:
@@ -237,9 +244,10 @@ class VirtualSkin:
                 values[name] += left_over * (left - values[name])
         full, counts = parts.full_count, {}
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
+        mains = real.mains_volts * math.sin(_MAINS_RATE * start) if real.mains_volts else 0.0
         for name in self._channels:
-            value = values[name]
-            count = value * (ampere if name in _CURRENT_NAMES else volt)
+            value = values[name] + (mains if name in _GUIDE_NAMES else 0.0)
+            count = value * (ampere * real.current_gain if name in _CURRENT_NAMES else volt) + real.offset_counts
             if real.noise_counts:
                 count += rng.gauss(0.0, real.noise_counts)
             counts[name] = min(max(round(count), 0), full)
@@ -277,6 +285,18 @@ def _leaking(sheets: Matrix, leak: float) -> Matrix:
         tuple(y + leak * part for y, part in zip(row, parts, strict=True))
         for row, parts in zip(sheets, _LEAK_MATRIX, strict=True)
     )
+
+
+def _warmed(sheets: Matrix, sensor: Sensor, grown: tuple[float, float]) -> Matrix:
+    """Return the sheets with resistances that have grown by these ratios; contacts conduct little beside them."""
+    if not any(grown):
+        return sheets
+    rows = [list(row) for row in sheets]
+    for first, ohms, ratio in ((0, sensor.radial_ohms, grown[0]), (2, sensor.angular_ohms, grown[1])):
+        lost = ratio / (1.0 + ratio) / ohms
+        for j, k, sign in ((0, 0, -1.0), (1, 1, -1.0), (0, 1, 1.0), (1, 0, 1.0)):
+            rows[first + j][first + k] += sign * lost
+    return tuple(tuple(row) for row in rows)
 
 
 _PRESS_DIGITS = 3  # decimals of a force [N]: below a count, and a pressure that rests need not be solved again

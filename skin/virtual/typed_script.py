@@ -15,7 +15,16 @@ from .circuit import WiringFaults
 from .fault_injection import FaultInjection
 from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 
-__all__ = ["FAULT_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_press", "read_script"]
+__all__ = [
+    "ELECTRIC_FLAWS",
+    "FAULT_NAMES",
+    "FLAW_NAMES",
+    "TOUCH_SHAPES",
+    "parse_fault",
+    "parse_flaw",
+    "parse_press",
+    "read_script",
+]
 
 _MAX_SCRIPT = 1 << 20  # bytes of a script
 _PALM_RADIUS = 0.03  # m; radius of its face
@@ -30,6 +39,9 @@ TOUCH_SHAPES: dict[str, Callable[[Frustum, ScriptedTouch], list[ScriptedTouch]]]
 }
 #: Faults that can be typed.
 FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
+#: of the electronics, and of time
+ELECTRIC_FLAWS = frozenset({"current_gain", "offset_counts", "mains_volts", "warming"})
+FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(ELECTRIC_FLAWS))
 
 
 def read_script(path: Path) -> list[tuple[str, ScriptedTouch]]:
@@ -120,3 +132,18 @@ def parse_fault(text: str) -> tuple[str, int | str | WiringFaults]:
         return name, int(value, 0)
     except ValueError:
         raise SensorError(f"fault {name} must be a whole number such as {name}=50, got {value!r}") from None
+
+
+def parse_flaw(text: str) -> tuple[str, float]:
+    """Read NAME=VALUE of one flaw of a specimen.
+
+    Raises:
+        SensorError: no flaw has that name, or the value is no number.
+    """
+    name, _, value = text.partition("=")
+    if name not in FLAW_NAMES:
+        raise SensorError(f"a flaw must be one of {', '.join(FLAW_NAMES)}, got {name!r}")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise SensorError(f"flaw {name} must be a number such as {name}=0.05, got {value!r}") from None

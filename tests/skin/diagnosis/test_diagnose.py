@@ -119,3 +119,14 @@ def test_a_skin_on_which_all_is_right_is_not_blamed(length: int, count: int, rat
     for scene in ((), sensors):
         named = diagnose(window.capture(1.2), scene, BAUD)
         assert named.verdict == "ok", named.line
+
+
+@pytest.mark.parametrize(("volts", "named"), [(0.0, False), (0.02, True)])
+def test_mains_on_the_guides_are_named_and_noise_is_not(volts: float, named: bool) -> None:
+    skin = VirtualSkin(SENSOR, model="ladder", imperfections=Imperfections(mains_volts=volts), duration=0.4)
+    window = CaptureWindow(0.0)
+    for time, data in skin.packets():
+        window.feed(data, time)
+    found = diagnose(window.capture(0.4), (SENSOR,), None)
+    assert found.item == Cause.NONE.key
+    assert ("as by mains" in found.value) is named

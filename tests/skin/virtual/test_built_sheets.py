@@ -1,0 +1,104 @@
+"""Sheets as they are built: against NGSolve with the same tensor, and in the limits that have a formula."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from coneskin.geometry.frustum import Frustum
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import COATED_SHEETS, SheetTolerance
+from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, _Sheet, build_specimen, draw_flaws
+from coneskin.skin.virtual.circuit import LayerContact
+from coneskin.skin.virtual.field_contacts import FieldContacts
+from coneskin.skin.wire import FrameDecoder
+
+SENSOR = Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350.0)))
+CONTACT = LayerContact(0.06, 1.0, 1e-3, 0.004, 0.004)
+IDEAL = SheetFlaws()
+
+
+def centre(matrix) -> tuple[float, float]:
+    """Electrical centre of a contact, from the current that each electrode takes of a small one."""
+    a, b, c, d = (-(row[2] + row[3]) if k < 2 else -(row[0] + row[1]) for k, row in enumerate(matrix))
+    return a / (a + b), c / (c + d)
+
+
+def test_ideal_sheets_are_the_exact_field() -> None:
+    exact = np.array(FieldContacts().admittances(SENSOR, [[CONTACT]])[0])
+    built = np.array(BuiltSheets((IDEAL, IDEAL), FieldContacts()).admittances(SENSOR, [[CONTACT]])[0])
+    assert built == pytest.approx(exact, abs=1e-15)
+
+
+def test_a_slope_moves_the_potential_by_its_integral() -> None:
+    """f(x) = x + s (x^2 - x)/2 of a resistance 1 + s (x - 1/2)."""
+    flaws = (SheetFlaws(slope=0.1), IDEAL)
+    (matrix,) = BuiltSheets(flaws, FieldContacts()).admittances(SENSOR, [[CONTACT]])
+    (ideal,) = FieldContacts().admittances(SENSOR, [[CONTACT]])
+    x = CONTACT.u / SENSOR.frustum.slant
+    moved = centre(matrix)[0] - centre(ideal)[0]
+    assert moved == pytest.approx(0.05 * (x * x - x), rel=0.02)
+    assert centre(matrix)[1] == pytest.approx(centre(ideal)[1], abs=1e-4)
+
+
+def test_a_line_fed_at_one_end_has_the_resistance_of_its_ladder() -> None:
+    """An electrode of r ohm whose current leaves evenly is r/3 in series, to first order."""
+    bare = np.array(BuiltSheets((SheetFlaws(lines=(3.0, 0.0)), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
+    ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
+    assert 1.0 / bare[0, 0] - 1.0 / ideal[0, 0] == pytest.approx(1.0, rel=0.02)
+
+
+def test_what_peels_off_narrows_the_way_of_the_current() -> None:
+    bare = np.array(BuiltSheets((SheetFlaws(peeled=0.2), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
+    ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
+    assert 0.9 * ideal[0, 0] < bare[0, 0] < 0.999 * ideal[0, 0]
+
+
+@pytest.mark.parametrize(("slope", "across", "skew", "stretch"), [(0.2, 0.1, 0.05, 0.1), (-0.3, 0.0, -0.1, 0.0)])
+def test_the_field_of_a_sheet_is_that_of_ngsolve(slope: float, across: float, skew: float, stretch: float) -> None:
+    ngsolve = pytest.importorskip("ngsolve")
+    from netgen.occ import OCCGeometry, WorkPlane
+
+    length, breadth = 0.24, 0.229
+    face = WorkPlane().Rectangle(length, breadth).Face()
+    for edge in face.edges:
+        edge.name = "B" if edge.center.x < 1e-9 else "A" if edge.center.x > length - 1e-9 else "rim"
+    mesh = ngsolve.Mesh(OCCGeometry(face, dim=2).GenerateMesh(maxh=0.04))
+    space = ngsolve.H1(mesh, order=6, dirichlet="A|B")
+    u, v = space.TnT()
+    resistance = 1.0 + slope * (ngsolve.x / length - 0.5) + across * (ngsolve.y / breadth - 0.5)
+    tensor = ngsolve.CF((1.0, skew, skew, 1.0 + stretch), dims=(2, 2)) / (1000.0 * resistance)
+    form = ngsolve.BilinearForm(tensor * ngsolve.grad(u) * ngsolve.grad(v) * ngsolve.dx).Assemble()
+    field = ngsolve.GridFunction(space)
+    field.Set(mesh.BoundaryCF({"B": 1.0}, 0.0), ngsolve.BND)
+    rest = (-form.mat * field.vec).Evaluate()
+    field.vec.data += form.mat.Inverse(space.FreeDofs()) * rest
+    energy = ngsolve.Integrate(tensor * ngsolve.grad(field) * ngsolve.grad(field), mesh)
+    own = _Sheet(SheetFlaws(slope, across, 0.0, skew, stretch), (length, breadth), 1000.0)
+    assert own.own[0, 0] == pytest.approx(energy, rel=1e-3)  # the bond of an electrode is 5 mohm of a kilohm
+    for i, j in ((12, 12), (24, 40), (40, 6)):
+        seen = own.answer[i * 49 + j, 0]
+        assert seen == pytest.approx(field(mesh(length * i / 48, breadth * j / 48)), abs=1e-4)
+
+
+def test_a_specimen_is_drawn_by_its_seed() -> None:
+    assert draw_flaws(COATED_SHEETS, 3) == draw_flaws(COATED_SHEETS, 3)
+    assert draw_flaws(COATED_SHEETS, 3) != draw_flaws(COATED_SHEETS, 4)
+    (built,), _ = build_specimen([SENSOR], SheetTolerance(lead=5.0), 1, "ladder")
+    assert all(ohms > 1.0 for ohms in built.electronics.lead_ohms)
+
+
+def test_the_command_sends_a_specimen(tmp_path) -> None:
+    def run(*options: str) -> bytes:
+        out = tmp_path / "out.bin"
+        command = ["sim-skin", "--duration-s", "0.2", "--output", str(out), "--touch", "0.05:0.2:200:90", *options]
+        done = subprocess.run([sys.executable, "-m", "coneskin", *command, "--json"], capture_output=True, timeout=100)
+        assert done.returncode == 0, done.stderr
+        assert json.loads(done.stdout.splitlines()[-1])["bytes"] == out.stat().st_size
+        return out.read_bytes()
+
+    frames = [FrameDecoder().feed(run(*options))[-1] for options in ((), ("--flaw", "slope=0.2", "--flaw", "lead=5"))]
+    assert abs(frames[0].radial_c - frames[1].radial_c) > 20
