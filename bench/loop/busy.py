@@ -158,10 +158,13 @@ def main() -> None:
         if run._process.poll() is not None:
             print(run.errors)
         stood = [event["monotonic"] for event in controller.events("standstill")]
-    judge(events, touches, stood, CLOCK() - began)
+        moved = [e["monotonic"] for e in controller.events("motion") if e["kind"] != "StopJoints"]
+    judge(events, touches, stood, moved, CLOCK() - began)
 
 
-def judge(events: list[dict[str, Any]], touches: list[float], stood: list[float], seconds: float) -> None:
+def judge(
+    events: list[dict[str, Any]], touches: list[float], stood: list[float], moved: list[float], seconds: float
+) -> None:
     """Print how long each touch took, and what else has stopped the arm."""
     stops = [event for event in events if event["name"] == "stopping"]
     times, late, unseen, explained = [], [], 0, set()
@@ -172,9 +175,14 @@ def judge(events: list[dict[str, Any]], touches: list[float], stood: list[float]
             unseen += 1
             continue
         explained.add(stop["stop"])
+        if max((at for at in stood if at < stop["at"]), default=0.0) > max(
+            (at for at in moved if at < stop["at"]), default=0.0
+        ):
+            continue  # it had just arrived
         times.append(end - touched)
         late += [end - touched] if end - touched > BUDGET else []
-    needless = [s for s in stops if s["stop"] not in explained]
+    others = [s for s in stops if s["stop"] not in explained]
+    needless = [s for s in others if "; then " not in s["why"]]  # the others repeat the stop of an arm that stands
     rows = [
         ["minutes", f"{seconds / 60.0:.1f}"],
         ["moves that arrived", sum(e["name"] == "arrived" for e in events)],
@@ -184,6 +192,7 @@ def judge(events: list[dict[str, Any]], touches: list[float], stood: list[float]
         ["... longest", f"{1e3 * max(times, default=0.0):.0f} ms"],
         [f"... later than {1e3 * BUDGET:.0f} ms", len(late)],
         ["further stop paths used", sum(e["name"] == "escalated" for e in events)],
+        ["stops repeated on a standing arm", len(others) - len(needless)],
         ["stops without a touch", len(needless)],
     ]
     show("Pick and place beside busy loops", ["", "value"], rows)

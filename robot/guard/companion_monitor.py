@@ -30,6 +30,7 @@ class _Heartbeats:
     def __init__(self, limits: Mapping[str, float]) -> None:
         self._limits = dict(limits)
         self._heard: dict[str, float] = {}
+        self.suspended = False  # the program, by the newest look
         self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
 
     def feed(self, process: str, now: float) -> None:
@@ -58,6 +59,8 @@ class _Heartbeats:
             heard = self._heard.get(process)
             if heard is None:
                 found[process] = f"{process}: no sign of life yet"
+                continue
+            if process == _USER_PROGRAM and not self.suspended:
                 continue
             since, what = self._held_up.get(process, (-math.inf, ""))
             waits = now - since <= _LOOK_TIME
@@ -109,9 +112,11 @@ class CompanionMonitor:
         """What stood against an activation when the clocks were last looked at, one line each."""
         return self._silent.values()
 
-    def hear_program(self, now: float) -> None:
-        """Note that the program that guards is not suspended, at a host time [s]."""
-        self._heartbeats.feed(_USER_PROGRAM, now)
+    def hear_program(self, now: float, suspended: bool) -> None:
+        """Take a look at the program that guards, at a host time [s]. Only a look shows that it is suspended."""
+        self._heartbeats.suspended = suspended
+        if not suspended:
+            self._heartbeats.feed(_USER_PROGRAM, now)
 
     def hear_helper(self, now: float) -> None:
         """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""

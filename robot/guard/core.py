@@ -317,7 +317,7 @@ class GuardCore:
                 self._add_fault(block.time, report.text, out)
 
     def _feed_program(self, block: Block, _: Outputs) -> None:
-        self._companions.hear_program(block.time)
+        self._companions.hear_program(block.time, suspended=bool(block.payload))
 
     def _feed_hold_up(self, block: Block, out: Outputs) -> None:
         """Take that this computer does not let the driver process, or the guard watchdog, run."""

@@ -355,8 +355,8 @@ class GuardLoop:
     def _look_at_processes(self) -> None:
         """Tell the core whether the program is suspended, and whether a helper that is late waits for a processor."""
         program, helper = self._ports.program, self._ports.helper
-        if program is not None and not program.suspended():
-            self._feed(BlockKind.PROGRAM, b"")
+        if program is not None:
+            self._feed(BlockKind.PROGRAM, b"suspended" if program.suspended() else b"")
         if helper is not None and self._beat - self._helper_heard > _LATE_TIME and helper.waits(self._beat):
             self._feed(BlockKind.HELD_UP, load().encode())
 

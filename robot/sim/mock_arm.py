@@ -105,7 +105,7 @@ class CompanionProcesses:
     """Program that guards, and driver process or guard watchdog, as far as a core hears them.
 
     Attributes:
-        program_is_mute: True where the program sends no heartbeat.
+        program_is_mute: True where the program is suspended.
         process_is_mute: True where driver process or guard watchdog sends nothing.
     """
 
@@ -128,8 +128,8 @@ class CompanionProcesses:
         due = now >= self._due
         if due:
             self._due = now + _REPORT_PERIOD
-        if due and not self.program_is_mute:
-            yield Block(BlockKind.PROGRAM, now, b"")
+        if due:
+            yield Block(BlockKind.PROGRAM, now, b"suspended" if self.program_is_mute else b"")
         if self.process_is_mute:
             return
         if not self._ready:

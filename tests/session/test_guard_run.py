@@ -20,9 +20,7 @@ def test_a_second_guard_of_one_arm_is_refused_and_two_names_are_one_arm():
         now[0] += seconds
 
     with _arm_lock("127.77.1.1"), _arm_lock("127.77.1.2"):
-        with pytest.raises(
-            RobotRefused, match=r"the arm at 127\.77\.1\.1, process \d+ of user"
-        ):
+        with pytest.raises(RobotRefused, match=r"the arm at 127\.77\.1\.1, process \d+ of user"):
             _arm_lock("127.77.1.1", 3.0, wait, lambda: now[0]).__enter__()
         assert now[0] == pytest.approx(3.0, abs=0.1)
         with _arm_lock("localhost", 0.0), pytest.raises(RobotRefused, match=r"the arm at 127\.0\.0\.1"):

@@ -63,7 +63,7 @@ class BlockKind(IntEnum):
     RESET = 5  #: a manual reset: the number of the stop that it forgives, and its own, in decimal digits
     LOST = 6  #: a source, a connection or a process is gone; the payload says which and why
     SLIDER = 7  #: payload of the speed slider, for the driver's ``decode_speed_fraction``
-    PROGRAM = 8  #: the program that guards is not suspended
+    PROGRAM = 8  #: a look at the program that guards: empty, or "suspended"
     ABSENT = 9  #: a stop path that is not there from the start; the payload says which connection and why
     EVENT = 10  #: a GuardEvent, JSON
     COMMAND = 11  #: a command as it was sent: to whom, a line feed, its bytes
