@@ -90,7 +90,7 @@ def test_moving_away_takes_the_force_off_that_a_stop_leaves() -> None:
     stop, retreat, comply = (collide(scene_of(kind)).outcome for kind in ("stop", "retreat", "comply"))
     assert stop.peak == pytest.approx(retreat.peak, rel=1e-6)  # until it stands, all brake alike
     assert retreat.clamp < 0.8 * stop.clamp
-    assert comply.clamp < 0.5 * stop.clamp
+    assert comply.clamp < 0.7 * stop.clamp  # as fast as the joints feel a push: slower than a retreat from a hand
 
 
 @pytest.mark.long
