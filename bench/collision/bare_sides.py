@@ -39,6 +39,7 @@ from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
 from coneskin.testing.scenes import commissioned
+from tests.support.bare_parts import bare_parts_of
 
 from .cases import ARM_MODELS, RUN_UP, RUN_UP_ACCELERATION, SPEED_RANGE, STIFFNESS_RANGE, scene_text
 
@@ -195,7 +196,7 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
     """Run one case in one way."""
     case = draw(seed)
     scene = case.scene(way, bare_side)
-    run = CollisionRun(scene, case.bodies, case.start, seed=seed, bare=True, period=5)
+    run = CollisionRun(scene, case.bodies, case.start, seed=seed, bare=bare_parts_of(scene), period=5)
     parts = len(run.plant.parts)
     forces, depths = [0.0] * parts, [0.0] * parts
     starts = run.plant.places

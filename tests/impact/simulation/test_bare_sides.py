@@ -15,6 +15,7 @@ from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
 from coneskin.testing.scenes import commissioned, forearm_scene
+from tests.support.bare_parts import bare_parts_of
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
@@ -37,7 +38,7 @@ def pushed(reaction: str, gap: float = 0.01) -> tuple[CollisionRun, float]:
 
     person = BodyScene("person", beside(PHI, 0.0398), mass=0.6, stiffness=25e3, force=PUSH, delay=0.02)
     fixed = BodyScene("hand", beside(PHI + math.pi, 0.03 + gap), radius=0.03, mass=1.2, stiffness=25e3)
-    run, most = CollisionRun(scene, [person, fixed], Q, bare=True, period=5), [0.0]
+    run, most = CollisionRun(scene, [person, fixed], Q, bare=bare_parts_of(scene), period=5), [0.0]
 
     def look() -> bool:
         most[0] = max([most[0], *(contact.force for contact in run.plant.contacts if contact.part == 1)])

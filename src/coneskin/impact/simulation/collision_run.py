@@ -36,7 +36,8 @@ from coneskin.skin.virtual.skin import PressedSkin
 
 from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
 from .mujoco_plant import MujocoPlant
-from .scene_plant import bare_parts_of, currents_of, presses_of, sheets_of
+from .scene_description import SheetOnLink
+from .scene_plant import currents_of, presses_of, sheets_of
 
 __all__ = ["PROTECTIONS", "CollisionRun", "follow_waypoints"]
 
@@ -118,7 +119,7 @@ class CollisionRun:
         seed: of the skins' noise.
         sheets: model of the skins' sheets, "ladder" or "field".
         heeds: True where what moves the arm obeys the speed slider; a stream of servo setpoints does not.
-        bare: True where bodies also meet what of the arm has no skin.
+        bare: parts of the arm without a skin that bodies meet too.
         period: as of `MujocoPlant`.
         note: is told each block that the guard takes, each event that it makes, the force of the contacts, where
             the bodies are, and which skin they touch, for a recording.
@@ -143,15 +144,14 @@ class CollisionRun:
         seed: int = 0,
         sheets: str = "ladder",
         heeds: bool = True,
-        bare: bool = False,
+        bare: Sequence[SheetOnLink] = (),
         period: int = 1,
         note: Callable[[Block], None] = lambda _: None,
     ) -> None:
         assert scene.arm is not None
         model = arm_model(scene.arm.model)
         self._skins = sheets_of(scene)
-        without = bare_parts_of(scene) if bare else ()
-        self.plant = MujocoPlant(model, self._skins, bodies, scene.padding or Padding(), q, period=period, bare=without)
+        self.plant = MujocoPlant(model, self._skins, bodies, scene.padding or Padding(), q, period=period, bare=bare)
         self.arm = MockArm(list(q), [0.0] * 6, heeds=heeds)
         self.meter = ImpactMeter()
         self.events: list[GuardEvent] = []
