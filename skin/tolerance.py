@@ -92,9 +92,7 @@ class PlaceFloor:
         self._slope, self._patches = 0.25 * tolerance.slope**2, _PATCH_SHARE * tolerance.patches**2
         self._skew = tolerance.skew
         self._reading = _PHASE_COUNT * tolerance.reading**2
-        self._contact, self._share = tolerance.contact**2, 0.0
-        if tolerance != IDEAL_SHEETS:
-            self._share = _CONTACT_SHARE
+        self._contact, self._share = tolerance.contact**2, _CONTACT_SHARE if tolerance != IDEAL_SHEETS else 0.0
         self._mapped = tolerance.map_error
 
     def at(self, x: float, y: float, move_x: float, move_y: float) -> tuple[float, float, float]:

@@ -22,21 +22,13 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS
 
+from . import typed_script
 from .circuit import ContactModel
 from .fault_injection import FaultInjection
 from .imperfections import Imperfections
 from .scripted_touch import ScriptedTouch
 from .skin import MODELS, VirtualSkin
-from .typed_script import (
-    ELECTRIC_FLAWS,
-    FAULT_NAMES,
-    FLAW_NAMES,
-    TOUCH_SHAPES,
-    parse_fault,
-    parse_flaw,
-    parse_press,
-    read_script,
-)
+from .typed_script import FAULT_NAMES, FLAW_NAMES, TOUCH_SHAPES, parse_fault, parse_flaw, parse_press, read_script
 
 __all__ = ["EXAMPLE", "HELP", "add_arguments", "run"]
 
@@ -159,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
         raise SensorError(f"--sensors must be at least 1, got {args.sensors}")
     sensors = [Sensor(frustum, args.sensor + number, device_id=args.device) for number in range(args.sensors)]
     flaws = dict(args.flaw)
-    own = {name: flaws[name] for name in ELECTRIC_FLAWS & flaws.keys()}
+    own = {name: flaws[name] for name in typed_script.ELECTRIC_FLAWS & flaws.keys()}
     tolerance = replace(SHEET_CLASSES[args.specimen], **{k: v for k, v in flaws.items() if k not in own})
     model: ContactModel | str = args.model
     if tolerance != IDEAL_SHEETS:

@@ -182,10 +182,8 @@ class VirtualSkin:
         key = (scenes, leaks, wiring, grown)
         known = self._measured.get(sensor.name)
         if known is None or known[0] != key:
-            sheets = [
-                _warmed(_leaking(y, leak), sensor, grown)
-                for y, leak in zip(self._sheets(sensor, scenes, times), leaks, strict=True)
-            ]
+            dry = zip(self._sheets(sensor, scenes, times), leaks, strict=True)
+            sheets = [_warmed(_leaking(y, leak), sensor, grown) for y, leak in dry]
             known = (key, measure(sensor, sheets, wiring))
             self._measured[sensor.name] = known
         return known[1]

@@ -15,16 +15,7 @@ from .circuit import WiringFaults
 from .fault_injection import FaultInjection
 from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 
-__all__ = [
-    "ELECTRIC_FLAWS",
-    "FAULT_NAMES",
-    "FLAW_NAMES",
-    "TOUCH_SHAPES",
-    "parse_fault",
-    "parse_flaw",
-    "parse_press",
-    "read_script",
-]
+__all__ = ["FAULT_NAMES", "FLAW_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_flaw", "parse_press", "read_script"]
 
 _MAX_SCRIPT = 1 << 20  # bytes of a script
 _PALM_RADIUS = 0.03  # m; radius of its face

@@ -36,11 +36,8 @@ _SEAM_MODEL_ERROR = 0.02  # of P_yy; gains of the two phases, and the coupling
 _SEAM_MARGIN = 0.8  # of the limit; two contacts that are not quite at the edges show a little less
 _MAX_ALONG_SHARE = 2.0  # of the second contact, at the dangerous angle's distance along the side
 _COUPLING_TERMS = 12
-_OFFSET_1, _OFFSET_3, _OFFSET_5 = (
-    1.85,
-    -1.1,
-    0.25,
-)  # place of a disc over its mean distance, by how unequal its two parts are
+# place of a disc over its mean distance, by how unequal its two parts are
+_OFFSET_1, _OFFSET_3, _OFFSET_5 = 1.85, -1.1, 0.25
 _ACROSS_DEVIATION = 0.5  # of the mean distance; standard deviation of the centroid across the seam
 _ALONG_DEVIATION = 0.1  # of the mean distance; likewise along the side
 

@@ -198,10 +198,8 @@ class TouchPlace:
         dipole = estimate.dipole
         identified = dipole.log_radius_deviation < 0.5
         self._told = (math.exp(dipole.log_radius), dipole.log_radius_deviation) if identified else _NO_DETAILS
-        self._softer, self._harder = (
-            (1.0 - _SOLVE_STEP) * mean.conductance,
-            (1.0 + _SOLVE_STEP) * mean.conductance,
-        )
+        step = _SOLVE_STEP * mean.conductance
+        self._softer, self._harder = mean.conductance - step, mean.conductance + step
         self._estimate, self._rest = estimate, _REFRESH_FRAMES
         self._next = frames * _REFRESH_RATIO if frames < _FLOOR_FRAMES else math.inf
         return estimate

@@ -22,7 +22,11 @@ from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from coneskin.skin.sensor import Sensor
+
+    Floats = NDArray[np.float64]
 
 __all__ = [
     "MIN_TOUCHES",
@@ -126,14 +130,6 @@ def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]
                 f"{sensor.name} cannot be calibrated: it bends places {word} by more than a calibration takes off "
                 f"({', '.join(f'{value:+.3f}' for value in numbers)}): is the sheet torn, or far from uniform?"
             )
-
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from coneskin.skin.sensor import Sensor
-
-    Floats = NDArray[np.float64]
 
 
 _AFFINE_TERMS = 3
