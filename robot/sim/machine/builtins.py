@@ -15,7 +15,7 @@ from inspect import isgeneratorfunction
 from typing import Any
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.inertia import joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ZERO_VELOCITY
@@ -181,14 +181,14 @@ class Builtins(
 
     def get_mass_matrix(self, q: Any = None, include_rotors_inertia: bool = False) -> Array:
         """Return the mass matrix of the bare arm at joint positions, 6 x 6 [kg m^2]; by default at the present ones."""
-        inertia = self._arm.inertia
+        inertia = arm_inertia(self._arm.model)
         rotor = inertia.rotor if include_rotors_inertia else ZERO_VELOCITY
         rows = mass_matrix(self._arm.model, replace(inertia, rotor=rotor), self._posed(q, None).q)
         return Array(Array(row) for row in rows)
 
     def get_coriolis_and_centrifugal_torques(self, q: Any = None, qd: Any = None) -> Array:
         """Return what joint speeds alone take of torque, of the bare arm [N m]; by default the present ones."""
-        model, inertia, here = self._arm.model, self._arm.inertia, self._posed(q, None).q
+        model, inertia, here = self._arm.model, arm_inertia(self._arm.model), self._posed(q, None).q
         speeds = self._arm.qd if qd is None else numbers(qd, 6, "qd")
         moving = joint_torques(model, inertia, here, speeds, ZERO_VELOCITY)
         standing = joint_torques(model, inertia, here, ZERO_VELOCITY, ZERO_VELOCITY)
