@@ -21,7 +21,8 @@ def _calls(path: Path) -> set[str]:
     return (names & _OPENS_A_PORT) | (imported & servers)
 
 
-_NAMES = {"src/coneskin/session/guard_run.py": {"bind"}}  # a name on this computer: it is bound, and never listens
+#: a name on this computer, at which who is refused asks whose it is; nothing is read from it
+_NAMES = {"src/coneskin/session/guard_run.py": {"bind", "listen"}}
 _PAGES = {"src/coneskin/view/page_server.py": {"bind"}}  # viser listens: of a page to look at, or of the designer's
 
 

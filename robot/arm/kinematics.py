@@ -48,6 +48,7 @@ from .vectors import added, cross, scaled
 __all__ = [
     "JOINTS",
     "LINK_INDEX",
+    "MESHED_ARMS",
     "cos_sin",
     "dh_link",
     "dh_mesh",
@@ -187,6 +188,8 @@ _TUBE_OFFSETS = {
     "UR30": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
 }
 
+MESHED_ARMS = frozenset(_TUBE_OFFSETS)  #: arms of which it is known where the meshes of their links lie
+
 _QUARTER_TURN = math.pi / 2.0  # rad
 _ALONG_THE_ARM = (_QUARTER_TURN, 0.0, -_QUARTER_TURN)  # upper arm and forearm: the mesh's z axis runs along the link
 #: link -> roll, pitch and yaw of its mesh in the URDF frame [rad]
@@ -219,7 +222,10 @@ def link_mesh(model: ArmModel, link: str) -> Pose:
     name = _name(link)
     offsets = _TUBE_OFFSETS.get(model.name)
     if offsets is None:
-        raise KinematicsError(f"meshes are known for {', '.join(_TUBE_OFFSETS)}, got the arm {model.name!r}")
+        raise KinematicsError(
+            f"meshes are known for {', '.join(_TUBE_OFFSETS)}, got the arm {model.name!r}: place its sensors with "
+            'frame = "urdf" or "dh" in [[link]]'
+        )
     index = LINK_INDEX[name]
     along = offsets[index - 2] if index >= 2 else 0.0
     aside = offsets[5] if index == 6 else 0.0

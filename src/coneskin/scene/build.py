@@ -236,19 +236,17 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
 
     placed = []
     for link in scene.links:
-        index, dh_mesh_frame, dh_frame, arm = 0, Pose(), Pose(), None
+        index, dh_frame, arm = 0, Pose(), None
         if scene.arm is not None:
             from coneskin.robot.arm.kinematics import dh_link, dh_mesh, link_index
             from coneskin.robot.arm.models import arm_model
 
             index, arm = link_index(link.name), arm_model(scene.arm.model)
-            dh_mesh_frame = dh_mesh(arm, link.name)
-            frames = {"mesh": dh_mesh_frame, "urdf": dh_link(arm, link.name), "dh": Pose()}
-            dh_frame = frames[link.frame]
+            dh_frame = {"mesh": dh_mesh, "urdf": dh_link}.get(link.frame, lambda *_: Pose())(arm, link.name)
         frusta = [item.placed.moved(dh_frame) for item in link.sensors]
         on_mesh: Sequence[DisplacementMap | None] = [None] * len(frusta)
         if link.mesh and surfaces is None:
-            on_mesh = _measured(link.mesh, dh_mesh_frame, frusta)
+            on_mesh = _measured(link.mesh, Pose() if arm is None else dh_mesh(arm, link.name), frusta)
         elif link.mesh and surfaces is not None:
             on_mesh = [
                 _carried(scene, item.sensor.name, at, surfaces) for item, at in zip(link.sensors, frusta, strict=True)

@@ -107,13 +107,15 @@ def _placing(scene: Scene) -> Iterator[str]:
 
 def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     """Compare the sensors of a tube with its axis and its neighbour."""
-    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
+    from coneskin.robot.arm.kinematics import LINK_INDEX, MESHED_ARMS, link_index
     from coneskin.robot.arm.models import arm_model
 
     name = next(known for known, number in LINK_INDEX.items() if number == link_index(link.name))
     if name not in _TUBES:
         return
     arm = arm_model(model)
+    if arm.name not in MESHED_ARMS and link.frame != "mesh":
+        return
     length = abs(arm.a[_TUBES[name]])
     room = _ROOM * _tube_distance(arm)
     for item in link.sensors:

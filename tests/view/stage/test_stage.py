@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.kinematics import LINK_INDEX, link_poses
-from coneskin.robot.arm.models import MODEL_NAMES, arm_model
+from coneskin.robot.arm.kinematics import LINK_INDEX, MESHED_ARMS, link_poses
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
@@ -61,7 +61,7 @@ def distance(points: np.ndarray, solid: Solid) -> np.ndarray:
     return np.linalg.norm(points[:, None] - solid.vertices[None], axis=2).min(axis=1)
 
 
-@pytest.mark.parametrize("name", MODEL_NAMES)
+@pytest.mark.parametrize("name", sorted(MESHED_ARMS))
 @pytest.mark.parametrize("q", POSES)
 def test_the_solids_of_an_arm_lie_about_its_axes(name: str, q: tuple[float, ...]) -> None:
     """Every corner of the skeleton is inside of a solid, and no solid stands off the arm."""
@@ -83,7 +83,7 @@ def test_the_solids_of_an_arm_lie_about_its_axes(name: str, q: tuple[float, ...]
         assert off.max() < 1.6 * thick, solid.name
 
 
-@pytest.mark.parametrize("name", MODEL_NAMES)
+@pytest.mark.parametrize("name", sorted(MESHED_ARMS))
 @pytest.mark.parametrize("q", POSES)
 def test_neighbouring_links_meet(name: str, q: tuple[float, ...]) -> None:
     model = arm_model(name)

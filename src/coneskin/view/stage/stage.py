@@ -158,6 +158,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     bodies, starts = tuple(body_solids(scene.bodies)), tuple(place for body in scene.bodies for place in body.parts)
     if scene.arm is None:
         return Stage(title, None, (), sheets, bodies, starts)
+    from coneskin.robot.arm.kinematics import MESHED_ARMS
     from coneskin.robot.arm.models import arm_model
 
     from .solids import arm_solids
@@ -166,7 +167,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     slimmest: dict[int, float] = {}
     for sheet in sheets:
         slimmest[sheet.link] = min(sheet.slimmest, slimmest.get(sheet.link, sheet.slimmest))
-    solids = arm_solids(model, slimmest)
+    solids = arm_solids(model, slimmest) if model.name in MESHED_ARMS else ()
     if meshes:
         own = _link_meshes(scene, model)
         solids = (*(solid for solid in solids if solid.link not in {mesh.link for mesh in own}), *own)
