@@ -242,7 +242,8 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
             from coneskin.robot.arm.models import arm_model
 
             index, arm = link_index(link.name), arm_model(scene.arm.model)
-            dh_frame = {"mesh": dh_mesh, "urdf": dh_link}.get(link.frame, lambda *_: Pose())(arm, link.name)
+            if link.frame != "dh":
+                dh_frame = dh_mesh(arm, link.name) if link.frame == "mesh" else dh_link(arm, link.name)
         frusta = [item.placed.moved(dh_frame) for item in link.sensors]
         on_mesh: Sequence[DisplacementMap | None] = [None] * len(frusta)
         if link.mesh and surfaces is None:
