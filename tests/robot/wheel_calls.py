@@ -236,7 +236,10 @@ def inputs_and_outputs(host: str) -> dict[str, Any]:
     out["half"] = (_reach(receive, 0.5), receive.getTargetSpeedFraction())
     io.setSpeedSlider(0.0)
     out["none"] = _reach(receive, 0.0)
-    io.setSpeedSlider(1.0)
+    control.stopJ(10.0)
+    io.setSpeedSlider(1.0)  # not under a motion: that would be a protective stop
+    _until(lambda: receive.getTargetSpeedFraction() == 1.0)
+    control.moveJ(home, 1.0, 10.0, True)
     out["again"] = _reach(receive, 1.0)
     control.stopJ(10.0)
     control.moveJ(home, 3.0, 20.0)

@@ -23,11 +23,13 @@ from coneskin.robot.reaction.types import ContactOnLink
 
 __all__ = ["MAX_UNEXPLAINED", "TORQUE_PER_AMPERE", "OutsideTorque", "ResistanceMonitor", "push_torque"]
 
+# compiled by mypyc, a Final tuple of floats counts as never set: these three are none
+
 #: N m/A of each joint. Assumed, not measured on an arm
-TORQUE_PER_AMPERE: Final = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)
-_MIN_UNEXPLAINED: Final = (3.0, 3.0, 3.0, 1.5, 1.5, 1.5)  # N m; of a joint without noise and friction
+TORQUE_PER_AMPERE = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)
+_MIN_UNEXPLAINED = (3.0, 3.0, 3.0, 1.5, 1.5, 1.5)  # N m; of a joint without noise and friction
 #: N m; however large noise and friction are
-MAX_UNEXPLAINED: Final = (24.0, 24.0, 24.0, 9.0, 9.0, 9.0)
+MAX_UNEXPLAINED = (24.0, 24.0, 24.0, 9.0, 9.0, 9.0)
 _SPREADS: Final = 3.0  # of what was learned, that count as nothing
 _LEARNING_TIME: Final = 500.0  # states, 1 s
 _RESISTED_SAMPLES: Final = 3  # in a row, 6 ms; a single one may be noise

@@ -1,6 +1,6 @@
 """Fit of a place map to touches of known places: robust, and no richer than the touches support.
 
-For each of the two fractions: offset, gain and shear (unknown leads and joints, electrodes off their drawing, a sheet
+For each of the two fractions: offset and gain (unknown leads and joints, electrodes off their drawing), shear (a sheet
 that is mounted askew), and three terms that bend (sheets that are not uniform). Each group has a normal prior about 0.
 How wide it is, and how much beside the marks' own error is left unexplained, is not known: all of a grid of widths are
 fitted, and each weighs as much as it makes the touches likely (Bayesian model averaging). What is not there is left
@@ -133,7 +133,7 @@ def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]
 
 
 _AFFINE_TERMS = 3
-_AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset, gain and shear
+_AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset and gain, and of shear
 _BEND_WIDTHS = (0.0, 0.005, 0.02, 0.06)  # of the terms that bend
 _REST_RATIOS = (1.0, 1.3, 2.0, 4.0, 8.0)  # standard deviation of a touch over the marks' own error
 _SIMPLER_ODDS = 3.0  # that a group of terms, or anything beside them, is not there, before any touch
@@ -312,14 +312,14 @@ def _average(axis: _Axis, mark_error: float) -> _Posterior:
     design, missing = axis.terms * axis.metres[:, None], axis.missing * axis.metres
     count = len(missing)
     fits = []
-    for affine, bend, ratio in product(_AFFINE_WIDTHS, _BEND_WIDTHS, _REST_RATIOS):
-        prior = np.repeat([affine**2, bend**2], _AFFINE_TERMS)
+    for affine, shear, bend, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _BEND_WIDTHS, _REST_RATIOS):
+        prior = np.array([affine, affine, shear, bend, bend, bend]) ** 2
         noise = (ratio * mark_error) ** 2
         spread = design * prior
         inverse = np.linalg.inv(spread @ design.T + noise * np.eye(count))
         gain = spread.T @ inverse
         likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
-        likely += ((affine == 0.0) + (bend == 0.0) + (ratio == 1.0)) * math.log(_SIMPLER_ODDS)
+        likely += (affine, shear, bend, ratio - 1.0).count(0.0) * math.log(_SIMPLER_ODDS)
         fits.append((likely, gain, np.diag(prior) - gain @ spread, noise - mark_error**2, bend > 0.0))
     most = max(fit[0] for fit in fits)
     weights = np.array([math.exp(fit[0] - most) for fit in fits])
