@@ -41,7 +41,14 @@ def start_again(controller):
     if controller.state()["safety"] == "PROTECTIVE_STOP":  # on a busy machine the first stop may have needed it
         return
     send(controller.host, 30002, RAW)
-    until(lambda: controller.state()["q"][0] != before)
+
+    def meets_a_watchdog():
+        now = controller.state()
+        if now["runtime"] != "PLAYING" and now["safety"] != "PROTECTIVE_STOP":
+            send(controller.host, 30002, RAW)  # a stop that was under way has taken its place before it moved
+        return now["q"][0] != before or now["safety"] == "PROTECTIVE_STOP"
+
+    until(meets_a_watchdog)
     until(lambda: controller.state()["runtime"] != "PLAYING")  # the protective stop pauses it
     assert abs(controller.wait_for_standstill()["q"][0] - before) < 2.0, "rad; to its goals are 3.3"
 
