@@ -14,8 +14,6 @@ from typing import Any
 from bench.report import RESULTS, text_table
 from bench.table import BENCHES
 
-__all__ = ["main", "page"]
-
 _PAGE_FILE = Path(__file__).with_name("RESULTS.md")
 #: rows of a table on the page, of the usual run of a bench and of one with other options; the JSON file has all
 _ROWS_SHOWN = 8

@@ -16,8 +16,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-__all__ = ["RESULTS", "commit", "head", "machine", "quantile", "save", "show", "text_table"]
-
 RESULTS = Path(__file__).with_name("results")
 _TABLES: list[dict[str, Any]] = []  # of this run, for its JSON file
 

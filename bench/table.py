@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["BENCHES", "Bench"]
-
 _SIMULATED_ARM = "No real arm or controller was measured."
 _SIMULATED_SKIN = "No real skin was measured."
 

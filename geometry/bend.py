@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["Bend", "BentStrip", "RulingFrame", "bends_between", "check_bends", "frames_along"]
-
 _WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
 _MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Developable"]
-
 _AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
 _NORMAL_COUNT = 360  # by which the middle of a section is found
 _MAX_OPENING = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer

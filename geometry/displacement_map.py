@@ -23,8 +23,6 @@ from .placed_frustum import PlacedFrustum
 from .pose import Vector
 from .ray_casting import RayCaster
 
-__all__ = ["DisplacementMap", "heights_by_ray", "measure_displacement"]
-
 Floats = NDArray[np.float64]
 
 

@@ -22,14 +22,6 @@ from coneskin.core.files import read_file
 
 from .pose import Pose
 
-__all__ = [
-    "UNITS",
-    "Mesh",
-    "load_mesh",
-    "make_mesh",
-    "refuse_entities",
-]
-
 
 def _outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return those of points [m], shape (n, 3), that are corners of their hull: as far as all reach, these reach.

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from .bend import Bend
 
-__all__ = ["PlacedFrustum", "double_cone"]
-
 _STRAIGHT_DISTANCE = 1e-6  # m
 
 

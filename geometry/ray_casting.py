@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from .mesh import Mesh
 
-__all__ = ["RayCaster"]
-
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 

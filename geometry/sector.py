@@ -13,8 +13,6 @@ from coneskin.core.errors import GeometryError
 
 from .frustum import Frustum
 
-__all__ = ["Sector", "roll_up", "unroll"]
-
 
 @dataclass(frozen=True, slots=True)
 class Sector:

@@ -19,17 +19,6 @@ from coneskin.core.errors import GeometryError, MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 
-__all__ = [
-    "ClosedSurface",
-    "WrappedLayer",
-    "require_step_writer",
-    "shell_surface",
-    "to_stl",
-    "widest_nearby",
-    "without_undercut",
-    "write_step",
-]
-
 Floats = NDArray[np.float64]
 
 

@@ -18,8 +18,6 @@ from coneskin.core.files import read_file
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
 from .pose import Pose, Vector
 
-__all__ = ["load_urdf_link", "urdf_links"]
-
 
 def _expand_xacro(
     path: str | Path,

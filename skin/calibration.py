@@ -27,8 +27,6 @@ from coneskin.geometry.frustum import Frustum
 
 from .sheet_functions import LogScale
 
-__all__ = ["MAP_LIMITS", "ForceTable", "PlaceMap", "map_terms"]
-
 #: largest magnitude of each number of a fraction; an offset or a gain beyond it is another sheet, or another wiring
 MAP_LIMITS = (0.05, 0.05, 0.05, 0.15, 0.15, 0.15)
 _SQUARE_MEAN = 1.0 / 12.0

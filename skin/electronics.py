@@ -17,18 +17,6 @@ from typing import Literal, NamedTuple
 
 from coneskin.core.errors import SensorError
 
-__all__ = [
-    "HEADROOM",
-    "SENSE_GAIN",
-    "Electronics",
-    "GivenElectronics",
-    "LeadOhms",
-    "Polarity",
-    "Thresholds",
-    "match_electronics",
-    "shunt_ohms",
-]
-
 
 def _check_positive(owner: str, values: dict[str, tuple[float, str]]) -> None:
     for name, (value, unit) in values.items():

@@ -19,8 +19,6 @@ from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
 
-__all__ = ["SHEET_MATERIALS", "Padding", "SheetMaterial", "match_sheet_materials"]
-
 
 class SheetMaterial(NamedTuple):
     """A conductive sheet.

@@ -21,8 +21,6 @@ from .tolerance import FILM_SHEETS, SheetTolerance
 if TYPE_CHECKING:
     from .calibration import ForceTable, PlaceMap
 
-__all__ = ["Bounds", "Sensor", "sheet_resistances"]
-
 _MATCHED_ELECTRONICS = Electronics()  # this very object: to be chosen
 _MIN_NOMINAL_COUNTS = 16  # counts; half of it, the limit for an open wire, is well above noise
 

@@ -23,8 +23,6 @@ from __future__ import annotations
 import cmath
 import math
 
-__all__ = ["LogScale", "RobinFunction"]
-
 _log, _log1p, _expm1 = math.log, math.log1p, math.expm1
 
 

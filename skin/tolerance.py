@@ -23,8 +23,6 @@ from typing import Final
 
 from coneskin.core.errors import SensorError
 
-__all__ = ["COATED_SHEETS", "FILM_SHEETS", "IDEAL_SHEETS", "SHEET_CLASSES", "PlaceFloor", "SheetTolerance"]
-
 _LINE_SHARE: Final = 0.23  # of an electrode's own resistance: its mean drop is 1/3, and both electrodes' oppose
 _PATCH_SHARE: Final = 0.11  # of the variance of patches a third of a side wide: what a line through them sees
 _CONTACT_SHARE: Final = 0.25  # of the correction for a contact's size; none is a uniform disc

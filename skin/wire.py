@@ -15,21 +15,6 @@ from enum import IntFlag
 from struct import Struct
 from typing import Any, Final, NamedTuple
 
-__all__ = [
-    "DRIVEN_HEAD",
-    "FRAME_LENGTH",
-    "FRAME_LENGTHS",
-    "MAX_LENGTH",
-    "SYNC",
-    "VERSION",
-    "DrivenPotentials",
-    "Frame",
-    "FrameDecoder",
-    "Status",
-    "encode",
-    "frame_at",
-]
-
 SYNC: Final = b"\xc5\x3a"
 VERSION: Final = 1  #: of the format
 FRAME_LENGTHS: Final = (36, 40, 52)  #: bytes: one supply; that of each phase; with the driven potentials too

@@ -12,8 +12,6 @@ import mpmath as mp
 
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
 
-__all__ = ["closed_form", "reference"]
-
 mp.mp.dps = 64
 _TAYLOR_ORDER = 44
 _TIME_TOLERANCE = mp.mpf(10) ** -61

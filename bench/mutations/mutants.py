@@ -8,8 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Mutant", "draw", "mutants_of"]
-
 _COMPARISONS = {
     ast.Lt: ("<", ">"),
     ast.LtE: ("<=", ">="),

@@ -19,8 +19,6 @@ from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.scan import Chunk, walk
 from coneskin.runs.replay.run import Verdict, read_run
 
-__all__ = ["damage", "kill"]
-
 _REPLAY_EVERY = 10  # one trial in so many is replayed as well
 _HANG_TIME = 30.0  # s of processor time for one trial
 _CHILD_PROGRAM = """

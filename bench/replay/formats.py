@@ -13,8 +13,6 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
 
-__all__ = ["formats"]
-
 _CAN_LENGTH = 64  # bytes of a frame of CAN FD
 
 

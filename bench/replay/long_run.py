@@ -18,8 +18,6 @@ from coneskin.scene.reader import parse_scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 
-__all__ = ["record_long_run"]
-
 _START_TIME = 1000.0
 
 

@@ -12,8 +12,6 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import read_run
 
-__all__ = ["memory"]
-
 _TOUCHES_PROGRAM = "import sys; from coneskin import read_run; read_run(sys.argv[1]).touches()"
 
 

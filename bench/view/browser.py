@@ -8,17 +8,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "CHROMIUM_FLAGS",
-    "CHROMIUM_PROGRAM",
-    "PROCESS_KINDS",
-    "browser_processes",
-    "drawn_pictures",
-    "first_picture",
-    "memory_of",
-    "resident",
-]
-
 CHROMIUM_PROGRAM = "/usr/bin/chromium"
 CHROMIUM_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox")
 PROCESS_KINDS = ("renderer", "gpu-process")  # of the browser: the first runs the page, the second draws

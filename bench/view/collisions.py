@@ -10,8 +10,6 @@ from coneskin.core.recording.block import END, Block
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import read_run
 
-__all__ = ["RUN_FILE", "collisions_again", "header_of"]
-
 RUN_FILE = Path(__file__).parents[2] / "tests" / "data" / "collision.rec"
 _PAUSE_TIME = 0.1  # s between two collisions
 _TOUCH_STEP = 1000  # by which the numbers of touches go on with each collision

@@ -24,8 +24,6 @@ from coneskin.skin.wire import FrameDecoder
 
 from .browser import browser_processes, drawn_pictures, first_picture
 
-__all__ = ["guard_rounds", "print_lateness"]
-
 Spans = dict[str, list[tuple[float, float]]]
 
 _SETTLE_TIME = 2.0  # s after a change, before anything is measured

@@ -15,8 +15,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Viewer", "processor_time", "waited"]
-
 
 class Viewer:
     """Viewer that takes all that is sent, as a browser does, and draws nothing.

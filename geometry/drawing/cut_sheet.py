@@ -25,19 +25,6 @@ from .part_labels import PartLabel, ascii_text, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
 from .touch_marks import CoverMarks
 
-__all__ = [
-    "LINE_COLOURS",
-    "TEST_HOLE",
-    "TEST_SQUARE",
-    "CutPart",
-    "CutSheet",
-    "FaceUp",
-    "Stroke",
-    "cut_sheets",
-    "make_test_piece",
-    "nest_sheets",
-]
-
 
 def _layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> SheetLayout:
     """Return a layout for a layer at a height [m] above the link, so that its features lie on the same normals.

@@ -12,8 +12,6 @@ from coneskin.core.errors import GeometryError, MissingExtra
 from .cut_sheet import CutSheet
 from .outline import Outline, PathSegment, joint_bounds
 
-__all__ = ["ArcStyle", "to_dxf"]
-
 ArcStyle = Literal["bulge", "arc-line", "flattened"]
 #: AutoCAD colour numbers nearest to LINE_COLOURS; text is dark grey, because 7 is white on some screens
 _COLOR_INDEX = {"cut": 1, "hole": 6, "score": 5, "fold": 3, "label": 250}

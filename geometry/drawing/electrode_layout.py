@@ -25,16 +25,6 @@ from coneskin.geometry.frustum import Frustum
 
 from .surface_shape import ShapeCorner, ShapeTab, SheetSide, SurfaceShape
 
-__all__ = [
-    "ElectrodePlan",
-    "ResolutionForecast",
-    "SheetLayout",
-    "SurfaceRectangle",
-    "edge_room",
-    "forecast_resolution",
-    "lay_out_sheet",
-]
-
 #: side of the wires -> the electrode beside it, the one opposite to it, and the two that run towards it
 _SIDE_ELECTRODES = {"end1": "BADC", "end2": "ABDC", "edge0": "DCBA", "edge1": "CDBA"}
 _MIN_CUT_WIDTH = 1e-4  # m; no cutter makes a narrower strip or gap

@@ -16,8 +16,6 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-__all__ = ["PAPER_STACK", "AssemblyMode", "LayerStack", "SheetLayer", "snap_to_cylinder"]
-
 AssemblyMode = Literal["loose", "pairs", "bonded"]
 _MAX_LAYER_THICKNESS = 0.02  # m; of a layer: what is thicker is no sheet that can be wrapped
 #: number of the body to which each layer belongs when the sheet is wrapped; a body has one neutral surface

@@ -14,8 +14,6 @@ from coneskin.core.errors import GeometryError, MissingExtra
 
 from .cut_sheet import CutPart, CutSheet, Stroke
 
-__all__ = ["MaterialBed", "nest_on_beds"]
-
 _GRID_STEP = 1e-3  # m; boxes are packed in whole millimetres
 _MIN_BED_SIDE, _MAX_BED_SIDE = 0.05, 10.0  # m; side of a bed
 

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
 
-__all__ = ["FlatPoint", "Outline", "PathSegment", "circle_outline", "joint_bounds"]
-
 FlatPoint = tuple[float, float]
 
 

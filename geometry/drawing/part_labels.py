@@ -12,8 +12,6 @@ from coneskin.geometry.frustum import Frustum
 from .electrode_layout import SheetLayout, SurfaceRectangle
 from .surface_shape import ShapeCorner, drawing_point
 
-__all__ = ["CAP_HEIGHT", "PartLabel", "ascii_text", "part_labels", "strip_label"]
-
 #: height of a capital letter of Helvetica [em]
 CAP_HEIGHT = 0.718
 #: widths of Helvetica from space to tilde [em / 1000] (Adobe core 14 metrics)

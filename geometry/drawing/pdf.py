@@ -21,8 +21,6 @@ from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
-__all__ = ["PageSize", "to_pdf"]
-
 
 def _pdf_number(value: float) -> str:
     """Return a number to five decimals without an exponent, which PDF does not allow."""

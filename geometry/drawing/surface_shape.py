@@ -18,8 +18,6 @@ from coneskin.geometry.frustum import Frustum
 
 from .outline import FlatPoint, Outline, PathSegment, circle_outline
 
-__all__ = ["ShapeCorner", "ShapeTab", "SheetSide", "SurfaceShape", "draw_hole", "draw_shape", "drawing_point"]
-
 SheetSide = Literal["end1", "end2", "edge0", "edge1"]
 _MIN_CHORD = 1e-9  # m; vertices closer than this are merged
 _ROUNDING_ERROR = 1e-12  # m or rad; smaller differences of coordinates are rounding errors

@@ -10,8 +10,6 @@ from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
-__all__ = ["to_svg"]
-
 _MAX_ARC_RADIUS = 10.0  # m; beyond it a renderer in single precision misplaces the centre by more than 1 um
 
 

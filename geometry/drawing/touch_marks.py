@@ -14,8 +14,6 @@ from .layer_stack import LayerStack
 from .part_labels import PartLabel
 from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 
-__all__ = ["CoverMarks", "mark_parts", "marks_on_link", "touch_marks"]
-
 _FIRST_SHARE, _LAST_SHARE = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _MARKS_PER_SIDE = 3  # marks along and around
 _READ_LAYER = 3  # the upper conductive one, on which touches are located

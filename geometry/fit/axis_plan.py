@@ -19,16 +19,6 @@ from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
 from .touch_weights import TouchWeights
 
-__all__ = [
-    "AxisPlan",
-    "SheetRequirements",
-    "SideLine",
-    "kept_clear",
-    "largest_partial_wrap",
-    "plan_sheets",
-    "side_lines",
-]
-
 Floats = NDArray[np.float64]
 Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
 

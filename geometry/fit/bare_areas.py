@@ -20,17 +20,6 @@ from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, covered_points
 from .surface_samples import SurfaceSamples
 
-__all__ = [
-    "BareArea",
-    "BareLength",
-    "BareTally",
-    "bare_areas",
-    "bare_lengths",
-    "flat_samples",
-    "hull_note",
-    "sheet_more",
-]
-
 Floats = NDArray[np.float64]
 
 _MAX_HULL_FACES = 5000  # faces; a convex mesh with more is a smooth body, not a collision hull

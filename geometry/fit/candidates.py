@@ -26,13 +26,6 @@ from .fit_options import FitOptions
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
 
-__all__ = [
-    "AxisCandidate",
-    "SampledLink",
-    "find_axis_candidates",
-    "sample_link",
-]
-
 Floats = NDArray[np.float64]
 
 _FIT_ROUNDS = 30  # reweighted solutions

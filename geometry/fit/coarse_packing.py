@@ -18,8 +18,6 @@ from .cone_fit import InfiniteCone
 from .profile import AxisFrame, RadialProfile, measure_profile
 from .side import StraightSide
 
-__all__ = ["AxisSurvey", "Choice", "better_surveys", "grown", "packings", "profile_about", "survey_axes"]
-
 Floats = NDArray[np.float64]
 
 _AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another

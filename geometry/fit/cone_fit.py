@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from .surface_samples import SurfaceSamples
 
-__all__ = ["InfiniteCone", "fit_cone", "perpendicular_vectors"]
-
 Floats = NDArray[np.float64]
 
 MAX_HALF_ANGLE = math.radians(80.0)  #: rad; a flatter ring is a flange, not a cone

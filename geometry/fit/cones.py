@@ -21,8 +21,6 @@ from .plan import FineStage, SheetPlan, best_plan
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights
 
-__all__ = ["LEAST_GAIN", "LinkFit", "find_cones", "fit_cones"]
-
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre

@@ -12,8 +12,6 @@ from coneskin.core.errors import GeometryError
 
 from .touch_weights import TouchWeights
 
-__all__ = ["MOST_TOLERANCE", "FitOptions"]
-
 MOST_TOLERANCE = 0.020  #: m; a sheet that stands off further does not follow the link
 _MOST_BRIDGE = 0.100  # m; over a wider hole a sheet sags
 _SHEET_WIRES = 4  # of a sheet

@@ -17,8 +17,6 @@ from .axis_plan import AxisPlan
 from .side import StraightSide, azimuth_columns, covered_points
 from .surface_samples import SurfaceSamples
 
-__all__ = ["FittedSheet", "fitted_sheet"]
-
 
 @dataclass(frozen=True, slots=True)
 class FittedSheet:

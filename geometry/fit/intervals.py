@@ -13,8 +13,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["balance_borders", "choose_intervals", "least_deviation", "longest_intervals"]
-
 Floats = NDArray[np.float64]
 Interval = tuple[int, int]  #: first slice and the one after the last
 

@@ -18,8 +18,6 @@ from .cone_fit import InfiniteCone, fit_cone
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, covered_points, facet_offset
 
-__all__ = ["FineStage", "SheetPlan", "best_plan", "refine_axis"]
-
 Floats = NDArray[np.float64]
 
 

@@ -15,8 +15,6 @@ from coneskin.geometry.ray_casting import RayCaster
 from .cone_fit import perpendicular_vectors
 from .touch_weights import TouchWeights
 
-__all__ = ["AxisFrame", "RadialProfile", "measure_profile"]
-
 Floats = NDArray[np.float64]
 
 

@@ -22,8 +22,6 @@ from .cones import LinkFit
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights, exposure_weights
 
-__all__ = ["place_seams"]
-
 Floats = NDArray[np.float64]
 
 _AZIMUTH_COUNT = 36

@@ -15,8 +15,6 @@ from .intervals import least_deviation
 from .profile import RadialProfile
 from .surface_samples import SurfaceSamples
 
-__all__ = ["StraightSide", "azimuth_columns", "covered_points", "facet_offset", "fit_side", "longest_run"]
-
 Floats = NDArray[np.float64]
 
 

@@ -11,8 +11,6 @@ from coneskin.core.errors import MeshError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
-__all__ = ["SurfaceSamples", "sample_surface"]
-
 Floats = NDArray[np.float64]
 
 

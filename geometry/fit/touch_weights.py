@@ -19,8 +19,6 @@ from coneskin.geometry.ray_casting import RayCaster
 from .cone_fit import perpendicular_vectors
 from .surface_samples import SurfaceSamples
 
-__all__ = ["LEAST_WEIGHT", "TouchWeights", "exposure_weights", "read_touch_weights"]
-
 Floats = NDArray[np.float64]
 
 LEAST_WEIGHT = 1e-3  #: of the largest; where nothing touches, a sheet may still lie, and it is worth nearly nothing

@@ -17,8 +17,6 @@ from .damped_least_squares import DAMPING_FLOOR, SINGULAR_BELOW, SINGULAR_DAMPIN
 from .kinematics import JOINTS, cos_sin
 from .model import ArmModel
 
-__all__ = ["CompiledLink", "compile_contact"]
-
 #: number known when the text is written, or name of a local variable, perhaps with a minus sign
 _Atom = float | str
 _Triple = tuple[_Atom, _Atom, _Atom]

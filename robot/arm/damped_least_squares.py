@@ -22,8 +22,6 @@ from coneskin.geometry.pose import Vector
 
 from .vectors import dot
 
-__all__ = ["DAMPING_FLOOR", "SINGULAR_BELOW", "SINGULAR_DAMPING", "damped_speeds", "damping_squared", "stacked_speeds"]
-
 #: damping at every position [m^2]; keeps the equations regular for a link that one or two joints move
 DAMPING_FLOOR = 1e-3**2
 #: further damping at a singularity [m^2]

@@ -34,8 +34,6 @@ from .model import ArmModel, Joints
 from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
 
-__all__ = ["GRAVITY", "ArmInertia", "LinkInertia", "arm_inertia", "joint_torques", "loaded", "mass_matrix"]
-
 #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 GRAVITY = 9.82
 

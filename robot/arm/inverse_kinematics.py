@@ -23,8 +23,6 @@ from coneskin.geometry.pose import Pose
 
 from .model import ArmModel, Joints
 
-__all__ = ["nearest", "solutions"]
-
 #: share of the reach by which a pose may be beyond it and still count as on the border; rounding of the pose itself
 _BORDER_SHARE = 1e-9
 #: sine of q5 below which the axes of joints 4 and 6 are parallel, and the pose determines only the sum of their angles

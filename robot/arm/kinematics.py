@@ -45,22 +45,6 @@ from coneskin.geometry.pose import Pose, Vector
 from .model import ArmModel, Joints
 from .vectors import added, cross, scaled
 
-__all__ = [
-    "JOINTS",
-    "LINK_INDEX",
-    "MESHED_ARMS",
-    "cos_sin",
-    "dh_link",
-    "dh_mesh",
-    "flange_jacobian",
-    "forward",
-    "link_index",
-    "link_mesh",
-    "link_pose",
-    "link_poses",
-    "point_jacobian",
-]
-
 JOINTS = 6  #: number of joints
 
 #: x, y and z axes and origin of a DH frame in the base frame

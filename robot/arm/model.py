@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 
 from coneskin.core.errors import KinematicsError
 
-__all__ = ["ZERO_VELOCITY", "ArmModel", "Joints"]
-
 #: one number for each joint, from the base on
 Joints = tuple[float, float, float, float, float, float]
 

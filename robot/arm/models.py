@@ -9,8 +9,6 @@ from coneskin.core.errors import KinematicsError
 from .model import ArmModel
 from .ur_models import UR_MODELS
 
-__all__ = ["MODEL_NAMES", "arm_model"]
-
 _MODEL_TABLE = {arm.name.lower(): arm for arm in UR_MODELS}
 #: names that ``arm_model`` knows
 MODEL_NAMES = tuple(arm.name for arm in UR_MODELS)

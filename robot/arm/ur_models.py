@@ -19,8 +19,6 @@ import math
 
 from .model import ArmModel, Joints
 
-__all__ = ["UR_MODELS"]
-
 _QUARTER_TURN = math.pi / 2.0  # rad
 
 

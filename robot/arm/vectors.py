@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from coneskin.geometry.pose import Vector
 
-__all__ = ["added", "cross", "dot", "minus", "scaled"]
-
 
 def added(a: Vector, b: Vector) -> Vector:
     """Return a + b."""

@@ -19,17 +19,6 @@ from .model import ArmModel, Joints
 from .models import MODEL_NAMES, arm_model
 from .vectors import dot, minus
 
-__all__ = [
-    "REACTION_TIME",
-    "ArmSweep",
-    "JointLimits",
-    "TablePlane",
-    "Workspace",
-    "arm_parts",
-    "reach",
-    "skeleton",
-]
-
 #: distance kept from a joint's limit [rad]
 _LIMIT_MARGIN = 0.02
 #: time until a command acts: two controller cycles, the network, and one cycle to see it [s]

@@ -21,8 +21,6 @@ from coneskin.core.channel import Channel
 from .liveness import BEAT_PERIOD
 from .messages import StatusReport
 
-__all__ = ["Deadman"]
-
 _WORK_TIMEOUT = 0.1  # s that one round of work may take, where nothing else was announced
 _LAST_WHILE = 1.5  # s for the last stop and for disconnecting, once a channel has ended
 _LOCK_TIMEOUT = 1.8  # s that a library may keep Python's lock

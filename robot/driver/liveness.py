@@ -8,16 +8,6 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-__all__ = [
-    "BEAT_PERIOD",
-    "GUARD_SILENCE",
-    "HOLD_UP_LIMIT",
-    "LIVENESS",
-    "SETPOINT_SILENCE",
-    "UNGUARDED_TIME",
-    "Liveness",
-]
-
 BEAT_PERIOD: Final = 0.03  #: s between two heartbeats, and between two looks at the program
 GUARD_SILENCE: Final = 0.5  #: s without a heartbeat of the guard after which the arm is stopped; 0.1 s occur under load
 UNGUARDED_TIME: Final = 1.0  #: s without one after which whoever else can stops the arm, and the program is told

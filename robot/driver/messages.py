@@ -11,19 +11,6 @@ from typing import NamedTuple
 
 from coneskin.robot.arm.model import Joints
 
-__all__ = [
-    "LEAVE",
-    "EndReaction",
-    "GuardCommand",
-    "Heartbeat",
-    "Release",
-    "SetJointVelocity",
-    "Shutdown",
-    "StatusReport",
-    "StopProgram",
-    "decode_command",
-]
-
 LEAVE = b"leave"  #: of the guarded program to a guard watchdog: it ends, and still listens
 
 _ONE_DOUBLE = struct.Struct("<d")

@@ -15,18 +15,6 @@ from coneskin.robot.arm.model import ArmModel
 
 from .values import ArmReading, ControllerState, JointVelocitySetpoint, SetpointProgram, StopPath
 
-__all__ = [
-    "ArmDriver",
-    "ExaminationScope",
-    "HeartbeatWriter",
-    "OutputWriter",
-    "PayloadReader",
-    "SetpointWriter",
-    "SpeedSlider",
-    "StopConnections",
-    "VariableReader",
-]
-
 
 class ExaminationScope(NamedTuple):
     """What a scene needs of a controller."""

@@ -8,8 +8,6 @@ from coneskin.core.errors import RobotRefused
 
 from .protocol import ArmDriver
 
-__all__ = ["DRIVERS", "load_driver"]
-
 #: family of an arm -> "module:object"; a new maker is one row
 DRIVERS = {"ur": "coneskin.robot.ur.driver:UR_DRIVER"}
 

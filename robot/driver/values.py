@@ -9,20 +9,6 @@ from typing import Any, NamedTuple, Self
 
 from coneskin.robot.arm.model import Joints
 
-__all__ = [
-    "DIGITAL_GROUPS",
-    "EXTERNAL_PATHS",
-    "INTERNAL_PATHS",
-    "ArmReading",
-    "ControllerState",
-    "JointVelocitySetpoint",
-    "SetSpeedSlider",
-    "SetpointProgram",
-    "StopPath",
-    "UseStopPath",
-    "Waypoint",
-]
-
 
 class ControllerState(NamedTuple):
     """One sample of the controller.

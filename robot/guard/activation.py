@@ -7,8 +7,6 @@ from enum import Enum
 
 from .signals.journal import EventName, Outputs, emit
 
-__all__ = ["Activation", "ActivationStep", "ControllerNeeds"]
-
 
 @dataclass(frozen=True, slots=True)
 class ControllerNeeds:

@@ -12,8 +12,6 @@ from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 from .signals.journal import EventName, Outputs, emit
 
-__all__ = ["ArmStop"]
-
 
 class ArmStop:
     """Newest stop of one arm, from its cause to the latched arm.

@@ -34,8 +34,6 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .motion.setpoint_stream import MotionStream, ReactionPlanner
     from .speed.speed_limit import SpeedLimit
 
-__all__ = ["ArmSupervisor"]
-
 _PLACE_TIME: Final = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
 
 

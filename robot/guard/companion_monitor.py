@@ -17,8 +17,6 @@ from coneskin.robot.stop.limits import MonitoringLimits
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["CompanionMonitor"]
-
 
 class _Heartbeats:
     """Ages of the signs of life of several processes.

@@ -6,8 +6,6 @@ report that is older than the program belongs to one before it.
 
 from __future__ import annotations
 
-__all__ = ["COUNT_PERIOD", "ControllerHeartbeat", "heartbeat_count"]
-
 COUNT_PERIOD = 0.02  #: s between two counts
 _COUNT_MASK = 0x3FFFFFFF  # counts are whole numbers of 30 bits
 _COUNT_MARGIN = 5  # counts by which a report may be older than the first state that shows the program

@@ -32,8 +32,6 @@ from .signals.journal import BlockKind, EventFolding, EventName, Outputs, decode
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
-__all__ = ["GuardCore"]
-
 _MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
 
 

@@ -33,11 +33,6 @@ from .signals.journal import BlockKind, Command, GuardEvent, Output, encode_comm
 if TYPE_CHECKING:
     from _typeshed import HasFileno
 
-__all__ = [
-    "GuardLoop",
-    "GuardPorts",
-]
-
 
 @dataclass(slots=True)
 class GuardPorts:

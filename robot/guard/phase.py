@@ -15,8 +15,6 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
 
-__all__ = ["TRANSITIONS", "Act", "Cue", "Phase", "Supervision", "transition"]
-
 
 class Phase(Enum):
     """Phase of a guard."""

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.robot.arm.model import ArmModel, Joints
 
-__all__ = ["MAX_BARE_WAY", "BareSides"]
-
 #: m by which a surface that no skin covers may move outward in a motion of ours, unless the scene allows more
 MAX_BARE_WAY = 0.002
 _FULL_WRAP = math.radians(359.0)  # from which on no finger fits between the ends of a sheet

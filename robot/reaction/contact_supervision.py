@@ -26,8 +26,6 @@ from coneskin.robot.arm.workspace import reach
 
 from .types import ContactOnLink
 
-__all__ = ["ContactApproach", "ContactSupervision", "clamped", "opposed"]
-
 _MIN_AWAY = 0.001  # m that the surface has moved away, as measured, from which on the level has to fall
 _MAX_APPROACH = 0.001  # m that the surface may move towards the touch: noise of the encoders, and of the control
 _FALL_TIME = 0.05  # s in which the level has to fall by _MIN_FALL, again and again until the touch is light

@@ -17,8 +17,6 @@ from .contact_supervision import clamped, opposed
 from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = ["ReactionMotion", "plan_reaction_motion"]
-
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
 _MIN_SPEED = 1e-3  # m/s; slower counts as standing
 _PUSH_DAMPING = 1500.0  # N s/m; between a push that the joints feel and the speed at which it is followed

@@ -25,8 +25,6 @@ from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, W
 
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
-__all__ = ["DISTANCE_TOLERANCE", "MIN_PROGRESS", "RetreatPlan", "plan_retreat", "retreat_step"]
-
 #: part of the wanted speed that a retreat must reach; otherwise it is not begun, or ends. In a regular place it is the
 #: squared cosine of the angle between the wanted motion and the nearest possible one: 0.25 is 60 deg, where the point
 #: slides 1.7 times as far along the obstacle as it gets away from it.

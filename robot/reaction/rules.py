@@ -10,8 +10,6 @@ from coneskin.core.errors import RobotRefused
 
 from .types import KINDS, Reaction
 
-__all__ = ["Rule", "RuleSet"]
-
 _MOVING_KINDS = ("comply", "retreat")
 
 

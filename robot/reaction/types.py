@@ -13,8 +13,6 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
 
-__all__ = ["BARE_SIDES", "KINDS", "ArmState", "ContactOnLink", "Done", "JointVelocity", "Reaction"]
-
 #: what an arm can do when it is touched, gentlest first
 KINDS = ("slow", "comply", "retreat", "stop")
 #: what a motion away does where it would move outward what no skin covers

@@ -27,8 +27,6 @@ from .machine.states import DEFAULT_MODEL, PORTS, START_Q, Options, Version
 from .motion.remote_plant import RemotePlant
 from .server import Server, is_loopback
 
-__all__ = ["EXAMPLE", "add_arguments", "main", "run"]
-
 EXAMPLE = """example:
   coneskin sim-ur --model ur10e --start-q-deg 0 -90 90 -90 -90 0
   python -c "import rtde_receive; print(rtde_receive.RTDEReceiveInterface('127.0.0.1').getActualQ())"

@@ -26,8 +26,6 @@ from .machine.builtins import Builtins
 from .urscript.translator import Translation, translate
 from .urscript.values import ScriptError
 
-__all__ = ["SIMULATOR_MEMORY", "Compiler", "bounded_memory"]
-
 SIMULATOR_MEMORY = 512 * 2**20  #: bytes that the simulated controller may take beyond what it has at its start
 _TRANSLATOR_MEMORY = 1024 * 2**20  # bytes for the translation of a program, likewise
 _STATUS_FILE = Path("/proc/self/statm")

@@ -9,8 +9,6 @@ from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram,
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.robot.ur.rtde_codec import STATE_RECIPE, Recipe
 
-__all__ = ["SLIDER", "CompanionProcesses", "MockArm"]
-
 #: what a controller reports of its speed slider
 SLIDER = Recipe(("target_speed_fraction",))
 

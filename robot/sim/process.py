@@ -26,8 +26,6 @@ from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
 from .machine.states import DEFAULT_MODEL, PORTS
 
-__all__ = ["SimulatedController", "free_host"]
-
 
 def free_host(used: Container[str] = ()) -> str:
     """Return a loopback address on which no other simulated controller listens, so that several can run at once.

@@ -31,8 +31,6 @@ from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
-__all__ = ["Server", "is_loopback"]
-
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
 _SERVICE_PORTS = {

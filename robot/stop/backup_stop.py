@@ -22,8 +22,6 @@ from .standstill import WATCH_DURATION, StandstillWatch
 from .state_age import StateAge
 from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-__all__ = ["BackupStop", "StandstillHold"]
-
 _STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
 _STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
 _REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing

@@ -34,8 +34,6 @@ from coneskin.robot.driver.registry import load_driver
 from .backup_stop import BackupStop, StandstillHold
 from .limits import MonitoringLimits
 
-__all__ = ["main"]
-
 _POLL_PERIOD = 0.01  # s between two looks
 _CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
 

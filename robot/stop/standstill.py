@@ -12,8 +12,6 @@ from coneskin.robot.driver.values import ControllerState
 
 from .stop_monitor import STANDSTILL_SAMPLES
 
-__all__ = ["WATCH_DURATION", "StandstillWatch"]
-
 #: s; programs that start anew after up to 0.3 s, and the time a controller needs to start and to move one
 WATCH_DURATION = 0.7
 _MAX_SPEED = 0.05  # rad/s; faster is a motion, and under a touch any speed is

@@ -12,8 +12,6 @@ from typing import Final
 
 from coneskin.robot.driver.values import ControllerState
 
-__all__ = ["StateAge"]
-
 _OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
 _MAX_STEP_AHEAD: Final = 0.25  # s by which a state may gain on the host's clock; more is no queue that is read out
 _MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed

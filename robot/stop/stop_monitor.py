@@ -11,8 +11,6 @@ import math
 
 from coneskin.robot.driver.values import StopPath
 
-__all__ = ["PROTECTIVE_PATIENCE", "STANDSTILL_SAMPLES", "StopMonitor"]
-
 STANDSTILL_SAMPLES = 5  #: samples in a row below the standstill speed that count as standing
 PROTECTIVE_PATIENCE = 4.0  #: times the patience for which a protective stop is left to work
 _SPEED_DROP = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from .input_writers import HeartbeatRegisters, RegisterWriter, RtdeSpeedSlider
     from .program_io import RtdeOutputWriter, RtdeVariableReader
 
-__all__ = ["UR_DRIVER"]
-
 
 class _UrDriver:
     """Driver of the UR family."""

@@ -37,8 +37,6 @@ from coneskin.robot.driver.values import Waypoint
 
 from .ur_rtde import MIN_ACCELERATION, MOVE_L_DECELERATION, SERVO_DECELERATION, STRAIGHT_MOVES, UrArm, stop_time
 
-__all__ = ["DriverProcess", "carry_out", "main"]
-
 _ANSWER_TIME = 0.5  # s for the controller to take a tool or a payload, or to answer a question
 _PATH_TIME = 3.0  # s for the controller to start its program again with a path in it
 _MAX_DURATION = 10.0  # s for which a speed or a position may hold

@@ -27,8 +27,6 @@ from .rtde_connection import PORT, RtdeConnection
 from .state_reader import StateReader
 from .stop_sockets import StopSockets
 
-__all__ = ["examine"]
-
 _REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
 _LISTEN_TIME = 1.0  # s of states
 _MAX_LATENESS, _MAX_GAP = 1.25, 0.025  # times the control cycle, of the median between two states; s, of the longest

@@ -29,20 +29,6 @@ from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
 from .state_reader import StateReader
 
-__all__ = [
-    "HEARTBEAT_INPUTS",
-    "SETPOINT_INPUTS",
-    "SLIDER_INPUTS",
-    "HeartbeatRegisters",
-    "RegisterWriter",
-    "RtdeSpeedSlider",
-    "decode_echo",
-    "decode_fraction",
-    "heartbeat_lines",
-    "program_text",
-    "set_slider",
-]
-
 _OUTPUT_FREQUENCY = 50.0  # Hz; enough to know where a person has put the slider
 
 # All registers are of the half that is for clients of RTDE; ur_rtde uses the other half by default.

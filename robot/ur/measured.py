@@ -18,8 +18,6 @@ from coneskin.core.files import read_file
 from coneskin.core.finding import Finding
 from coneskin.core.text import read_json
 
-__all__ = ["MEASURED_DECELERATION", "MeasuredController", "compare", "read_measured"]
-
 _MAX_SIZE = 1 << 20  # bytes
 _LIMIT_MARGIN = 1.2  # times what was measured, for a limit that shall hold
 MEASURED_DECELERATION = 10.0  #: rad/s2 of the stops by program that the script measures

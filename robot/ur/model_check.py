@@ -18,8 +18,6 @@ from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
 from .rtde_connection import RtdeConnection
 
-__all__ = ["check_model", "read_pose"]
-
 _POSE_NAMES = ("actual_q", "actual_TCP_pose", "tcp_offset")
 #: distance that the flange may be from where the model has it [m]; calibration makes a millimetre or two, another model
 #: of the family centimetres

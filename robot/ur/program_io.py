@@ -20,8 +20,6 @@ from . import rtde_codec as rtde
 from .rtde_codec import VARIABLES
 from .rtde_connection import RtdeConnection
 
-__all__ = ["RtdeOutputWriter", "RtdeVariableReader"]
-
 _READING_NAMES = (
     *("timestamp", "actual_q", "actual_qd", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
     *("robot_mode", "safety_mode", "target_speed_fraction", "runtime_state"),

@@ -20,28 +20,6 @@ from typing import Any, Final, NamedTuple
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import ControllerState
 
-__all__ = [
-    "HEADER",
-    "IN_USE",
-    "NOT_FOUND",
-    "PROTOCOL_VERSION",
-    "STATE_RECIPE",
-    "VARIABLES",
-    "Packet",
-    "PacketKind",
-    "Recipe",
-    "Value",
-    "decode_state",
-    "pack",
-    "pack_inputs_request",
-    "pack_outputs_request",
-    "pack_start_request",
-    "pack_version_request",
-    "split",
-    "split_names",
-    "unpack_types",
-]
-
 #: type on the wire -> (code of the struct module, number of values)
 _WIRE_TYPES: Mapping[str, tuple[str, int]] = {
     "DOUBLE": ("d", 1),

@@ -16,8 +16,6 @@ from coneskin.core.errors import RobotConnectionError, RobotTimeout
 
 from . import rtde_codec as rtde
 
-__all__ = ["PORT", "RtdeConnection"]
-
 PORT = 30004
 _CHECK_ADVICE = (
     "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "

@@ -14,8 +14,6 @@ from coneskin.robot.driver.values import ControllerState
 from . import rtde_codec as rtde
 from .rtde_connection import RtdeConnection
 
-__all__ = ["StateReader"]
-
 
 class StateReader(RtdeConnection):
     """Reader of the controller's state; open it in a ``with``.

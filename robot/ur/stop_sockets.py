@@ -32,8 +32,6 @@ from coneskin.robot.driver.values import SetpointProgram, StopPath
 
 from .rtde_connection import RtdeConnection
 
-__all__ = ["StopSockets"]
-
 _REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
 _MAX_ANSWER = 1024  # bytes of a line of the dashboard

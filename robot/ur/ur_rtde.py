@@ -26,17 +26,6 @@ from typing import Any
 from coneskin.core.errors import MissingExtra, RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
 
-__all__ = [
-    "MIN_ACCELERATION",
-    "MOVE_L_DECELERATION",
-    "SERVO_DECELERATION",
-    "STRAIGHT_MOVES",
-    "Mode",
-    "UrArm",
-    "stop_time",
-    "wheel_remedy",
-]
-
 _START_TIMEOUT = 2.0  # s for the control program to start; ur_rtde itself allows 5
 _REGISTER_DELAY = 0.02  # s, ten control cycles, until a register that was written has surely been read
 

@@ -29,8 +29,6 @@ from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, 
 from .place.touch_place import TouchPlace
 from .self_test import FrameSelfTest
 
-__all__ = ["Detector", "TouchAlarm"]
-
 #: called with the sensor's name and the level as soon as a touch is certain, before its place is worked out
 TouchAlarm = Callable[[str, float], None]
 

@@ -16,8 +16,6 @@ from .frame.faults import Fault
 from .frame.reading import TouchReading
 from .frame.settings import DetectorSettings
 
-__all__ = ["ReportedTouch", "SkinEvent", "SkinFault", "TouchBegan", "TouchEnded", "TouchEvent", "TouchMoved"]
-
 _FULL_TURN = 2.0 * math.pi
 
 

@@ -18,8 +18,6 @@ from .frame.faults import Fault
 from .frame.untouched import UntouchedCurrents
 from .wiring_hypothesis import Observation, PointContact, WiringHypothesis, list_hypotheses, observe
 
-__all__ = ["DIAGNOSED_FAULTS", "FaultDiagnosis"]
-
 #: Faults that a broken wire or part may be the cause of.
 DIAGNOSED_FAULTS = frozenset(
     {

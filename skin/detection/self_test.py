@@ -18,8 +18,6 @@ from coneskin.skin.sensor import Sensor
 from .frame.contact_matrix import ContactMatrix
 from .frame.untouched import UntouchedCurrents
 
-__all__ = ["FrameSelfTest"]
-
 _RECIPROCITY_LIMIT = 0.005  # of the supply, on a guide; a slide at 1 m/s leaves 4e-7, two contacts growing 10 %/ms 4e-4
 _SPLIT_LIMIT = 0.2  # of the supply; the same leave 0.014 and 0.03, a shunt 10 % off 0.14, pull-downs 1 % apart 0.1
 _DRAWN_LIMIT = 0.08  # of the touch phase's drive current; a pull-down and a shunt of 1 %, and an amplifier, leave 0.03

@@ -18,8 +18,6 @@ from .events import SkinEvent, SkinFault
 from .frame.faults import Fault
 from .frame.settings import DetectorSettings
 
-__all__ = ["TouchStream"]
-
 _MAX_BAD_BYTES: Final = 4 * FRAME_LENGTH  # bytes; more of them outside any frame are a corrupt stream
 _BAD_BYTES_DECAY: Final = 1  # byte; each good frame takes so many off the count
 

@@ -15,8 +15,6 @@ from coneskin.skin.wire import Frame
 
 from .frame.faults import Fault
 
-__all__ = ["Observation", "PointContact", "WiringHypothesis", "list_hypotheses", "observe"]
-
 _SHORT_CONDUCTANCE = 10.0  # S; of a short
 _OPEN_CONDUCTANCE = 1e-12  # S; brings what has lost all its wires to ground
 _WIRE_NAMES = "ABCD"

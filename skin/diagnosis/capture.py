@@ -12,19 +12,6 @@ from typing import NamedTuple
 
 from coneskin.skin.wire import MAX_LENGTH, SYNC, Frame, frame_at
 
-__all__ = [
-    "EDGE",
-    "Capture",
-    "CaptureWindow",
-    "FoundFrames",
-    "count_frames",
-    "find_frames",
-    "printable_share",
-    "short_hex",
-    "swap_bytes",
-    "sync_places",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Capture:

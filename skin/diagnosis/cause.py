@@ -6,8 +6,6 @@ from enum import Enum, unique
 
 from coneskin.core.finding import Finding
 
-__all__ = ["Cause"]
-
 
 @unique
 class Cause(Enum):

@@ -17,8 +17,6 @@ from .frame_numbers import find_wrong_numbers, measure_numbers
 from .frame_shape import find_damage, find_foreign_sync, find_padding, find_shape
 from .measurements import current_remarks, find_big_endian, find_status, find_wrong_measurements
 
-__all__ = ["diagnose"]
-
 _FEW_BYTES = 64  # bytes, of which nothing can be said
 _STOPPED_TIME = 0.7  # s without a byte
 _SHAPE_LENGTH = 1 << 13  # newest bytes in which the shape is looked for

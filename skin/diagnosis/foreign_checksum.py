@@ -19,8 +19,6 @@ from coneskin.core.finding import Finding
 from .capture import swap_bytes
 from .cause import Cause
 
-__all__ = ["crc16", "find_checksum"]
-
 _RIGHT_POLYNOMIAL = 0x1021  # polynomial of CRC-16/XMODEM
 _KNOWN_POLYNOMIALS = (_RIGHT_POLYNOMIAL, 0x8005, 0x3D65, 0x8BB7, 0xA097, 0xC867, 0x0589, 0x5935, 0x8D95)
 _POLYNOMIAL_NAMES = {0x8005: "0x8005 (MODBUS, ARC, USB)", 0x3D65: "0x3D65 (DNP)", 0x8BB7: "0x8BB7 (T10-DIF)"}

@@ -17,17 +17,6 @@ from .capture import Capture, count_frames, printable_share, short_hex
 from .cause import Cause
 from .foreign_checksum import crc16
 
-__all__ = [
-    "find_baud",
-    "find_coding",
-    "find_constant",
-    "find_protocol",
-    "find_text",
-    "first_line",
-    "undo_newlines",
-    "undo_slip",
-]
-
 #: Rates that are tried [1/s].
 _BAUD_RATES = (
     *(9600, 19200, 38400, 57600, 74880, 115200, 230400, 250000, 460800, 500000),

@@ -13,8 +13,6 @@ from coneskin.skin.wire import Frame
 
 from .cause import Cause
 
-__all__ = ["FrameNumbers", "find_wrong_numbers", "measure_numbers"]
-
 _MIN_FRAMES = 8
 _STEADY_SHARE = 0.9  # of the steps that must be of one kind
 _MIN_RATE = 100.0  # Hz

@@ -15,8 +15,6 @@ from .cause import Cause
 from .foreign_checksum import find_checksum
 from .foreign_stream import first_line, undo_newlines, undo_slip
 
-__all__ = ["find_damage", "find_foreign_sync", "find_padding", "find_shape"]
-
 _MIN_STARTS = 4  # that look like a frame's beginning
 _AGREEING_SHARE = 0.6  # of them that must agree
 _SAMPLE_COUNT = 48  # frames that are compared

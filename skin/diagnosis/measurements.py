@@ -13,15 +13,6 @@ from coneskin.skin.wire import Frame, Status
 from .capture import swap_bytes
 from .cause import Cause
 
-__all__ = [
-    "MEASURED",
-    "current_remarks",
-    "expected_counts",
-    "find_big_endian",
-    "find_status",
-    "find_wrong_measurements",
-]
-
 #: The measured fields of a frame, in the order of the wire.
 MEASURED = (
     *("touch_c", "touch_d", "touch_current"),

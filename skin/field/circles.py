@@ -29,17 +29,6 @@ from .disc import Discs
 from .green import Strip, StripPoints, direct_features, kernel, mirrored
 from .sheet import SectorSheet
 
-__all__ = [
-    "PHASE",
-    "Centres",
-    "Circles",
-    "circle",
-    "green_block",
-    "make_circles",
-    "offsets_of",
-    "pair_points",
-]
-
 _NEAR_ALPHA = 0.25  # |alpha| of an edge that counts as near: two radii between centre and edge
 
 

@@ -22,8 +22,6 @@ from coneskin.core.errors import FieldError
 
 from .sheet import SectorSheet
 
-__all__ = ["Disc", "Discs", "bessel_ratios", "centre_distance", "check_discs"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:

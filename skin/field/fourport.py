@@ -27,19 +27,6 @@ from .sheet import SectorSheet
 if TYPE_CHECKING:
     Numbers = float | Floats
 
-__all__ = [
-    "ELECTRODES",
-    "Coupling",
-    "DrivePhase",
-    "Readings",
-    "Terminal",
-    "admittance",
-    "angular_phase",
-    "radial_phase",
-    "solve_phase",
-    "touch_phase",
-]
-
 #: Order of every axis over electrodes: A (end 2) and B (end 1) of the upper sheet, C (phi=wrap) and D (phi=0) below.
 ELECTRODES = ("A", "B", "C", "D")
 

@@ -25,8 +25,6 @@ from numpy.typing import NDArray
 
 from coneskin.core.arrays import Complex, Floats
 
-__all__ = ["Strip", "StripPoints", "direct_features", "kernel", "mirrored"]
-
 
 @dataclass(frozen=True, slots=True)
 class Strip:

@@ -25,8 +25,6 @@ from .green import Strip, direct_features, kernel, mirrored
 from .model import FieldModel
 from .multipole import resolution, solve_to_tolerance
 
-__all__ = ["ErrorMap", "FieldMap", "decode_errors"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldMap:

@@ -24,9 +24,6 @@ from .one_scene import SceneSolver, scene_solver
 from .rim import near_apex, solve_rims
 from .sheet import SectorSheet
 
-__all__ = ["FieldModel", "solve"]
-
-
 #: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
 PAIRS_AT_ONCE = 12000
 

@@ -23,15 +23,6 @@ from .fourport import Coupling
 from .green import Strip
 from .sheet import SectorSheet
 
-__all__ = [
-    "FIRST",
-    "LADDER",
-    "higher",
-    "resolution",
-    "solve_discs",
-    "solve_to_tolerance",
-]
-
 #: Orders to choose from, so that a batch falls into few groups.
 LADDER = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 80, 96, 128, 192, 288, 432)
 

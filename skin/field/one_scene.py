@@ -27,8 +27,6 @@ from .fourport import Coupling
 from .green import Strip
 from .sheet import SectorSheet
 
-__all__ = ["SceneSolver", "scene_solver"]
-
 _MAX_ORDER = 32
 _ROUNDING_ERROR = 4e-16  # of a coefficient whose series does not cancel
 _FAR_DISTANCE = 40.0  # distance along the strip from which on exp(-s) is nothing beside 1

@@ -14,8 +14,6 @@ from coneskin.core.errors import MissingExtra
 from .maps import FieldMap
 from .sheet import SectorSheet
 
-__all__ = ["draw_potential", "make_figure", "paint_error"]
-
 _GRID_COUNT, _LINE_STEPS = 121, 160  # points along a side of a map; steps of a field line
 _MIN_ANGLE = 0.1  # rad of the sector; one of less is drawn as the rectangle that it nearly is
 

@@ -29,8 +29,6 @@ from .fourport import Coupling
 from .green import Strip, kernel
 from .sheet import SectorSheet
 
-__all__ = ["near_apex", "solve_rims"]
-
 _SCALE_FACTOR = 4.0  # from one scale to the next
 _MIN_SCALE = 1e-9  # scale, in radii; nearer than that a rim counts as touching
 

@@ -21,10 +21,6 @@ from numpy.typing import ArrayLike, NDArray
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
-__all__ = [
-    "SectorSheet",
-]
-
 
 class _ConeShape(Protocol):
     """The dimensions of a link that a sheet needs; `coneskin.geometry.frustum.Frustum` has them."""

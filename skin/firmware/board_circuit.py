@@ -11,8 +11,6 @@ from coneskin.skin.sensor import Sensor
 
 from .boards import BOARD_FACTS, BUILT_IN, Board, BoardFacts, Converter, boards, converters
 
-__all__ = ["BoardCircuit", "Part", "board_circuit", "ohms_text", "value_text"]
-
 _SWITCH_OHMS = 2.0  # of an analog switch
 _WIRE_OHMS = 1.0  # of the wire of an electrode
 _QUIET_BITS = 12  # with fewer, a converter without noise of its own reads the same count for ever

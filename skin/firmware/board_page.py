@@ -8,8 +8,6 @@ from coneskin.skin.electronics import SENSE_GAIN
 
 from .board_circuit import BoardCircuit, ohms_text
 
-__all__ = ["board_page", "wiring_diagram"]
-
 
 def board_page(circuit: BoardCircuit) -> str:
     """Return the page that stands beside the sketch."""

@@ -9,18 +9,6 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = [
-    "BOARD_FACTS",
-    "BUILT_IN",
-    "Board",
-    "BoardFacts",
-    "Converter",
-    "board_header",
-    "boards",
-    "converters",
-    "firmware_folder",
-]
-
 
 class BoardFacts(NamedTuple):
     """What is to be known about a board."""

@@ -18,8 +18,6 @@ from coneskin.core.keys import Key, with_meanings
 
 from .source import Source
 
-__all__ = ["GROUP", "SOURCE_KINDS", "SourceKind", "find_kind", "is_simulated", "open_source"]
-
 #: Kind of several sources that are read as one; its setting ``members`` holds a kind and its settings for each.
 GROUP: Final = "group"
 _ENTRY_POINTS = "coneskin.sources"

@@ -17,8 +17,6 @@ from typing import Any, NamedTuple, Self
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import MissingExtra, SkinConnectionError, SkinTimeout
 
-__all__ = ["PortFacts", "SerialPort", "find_ports"]
-
 
 class PortFacts(NamedTuple):
     """A serial port that is there."""

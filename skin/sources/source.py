@@ -13,8 +13,6 @@ from typing import Protocol, Self, runtime_checkable
 
 from coneskin.core.errors import ConeSkinError
 
-__all__ = ["Openable", "Source", "SourceReopening"]
-
 
 class Openable(Protocol):
     """An object that ``with`` opens and closes. It does nothing before ``open``."""

@@ -16,8 +16,6 @@ from coneskin.skin.wire import FrameDecoder
 
 from .source import Source
 
-__all__ = ["SourceGroup"]
-
 _TURN_TIME = 0.001  # s for each source in turn, where there is nothing to wait on for all of them
 
 

@@ -28,8 +28,6 @@ from .circuit import ContactModel, LayerContact, Matrix
 from .field_contacts import FieldContacts
 from .ladder import ResistorLadder
 
-__all__ = ["BuiltSheets", "SheetFlaws", "build_specimen", "draw_flaws"]
-
 _CELL_COUNT = 48  # of the mesh, along each side
 _BOND_SIEMENS = 200.0  # S for a whole electrode; silver on a film has milliohms
 _LEAST_LINE = 1e-4  # ohm; of an electrode that has none

@@ -15,19 +15,6 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import DrivenPotentials, Frame
 
-__all__ = [
-    "ContactModel",
-    "ConverterInputs",
-    "LayerContact",
-    "Matrix",
-    "WiringFaults",
-    "counts_of",
-    "frame_of",
-    "measure",
-    "solve",
-    "with_counts",
-]
-
 Matrix = tuple[tuple[float, ...], ...]
 _A, _B, _C, _D = range(4)
 _TERMINAL_NAMES = "ABCD"

@@ -30,8 +30,6 @@ from .scripted_touch import ScriptedTouch
 from .skin import MODELS, VirtualSkin
 from .typed_script import FAULT_NAMES, FLAW_NAMES, TOUCH_SHAPES, parse_fault, parse_flaw, parse_press, read_script
 
-__all__ = ["EXAMPLE", "HELP", "add_arguments", "run"]
-
 HELP = "run a virtual skin that sends the very bytes of a real one"
 EXAMPLE = """\
 example:

@@ -14,8 +14,6 @@ from coneskin.skin.wire import Frame, Status, encode
 
 from .circuit import ConverterInputs, WiringFaults, counts_of, with_counts
 
-__all__ = ["FaultInjection", "FaultyLine"]
-
 
 @dataclass(frozen=True, slots=True)
 class FaultInjection:

@@ -31,8 +31,6 @@ from coneskin.skin.sensor import Sensor
 from .circuit import LayerContact, Matrix
 from .ladder import ResistorLadder
 
-__all__ = ["FieldContacts"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FixedDiscs:

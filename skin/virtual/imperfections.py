@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
 
-__all__ = ["ContactLaw", "Foam", "Imperfections"]
-
 
 class _RoundContact(NamedTuple):
     """A round contact between the layers.

@@ -15,8 +15,6 @@ from coneskin.skin.sensor import Sensor
 
 from .circuit import ContactModel, LayerContact, Matrix
 
-__all__ = ["RIGHT_WIRES", "ResistorLadder", "RewiredSheets", "reorder", "wire_order"]
-
 _A, _B, _C, _D = range(4)
 _MIN_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
 

@@ -10,8 +10,6 @@ from coneskin.skin.sources.source import Source
 
 from .skin import VirtualSkin
 
-__all__ = ["MemorySource"]
-
 
 class MemorySource(Source):
     """Source of a virtual skin's bytes.

@@ -18,8 +18,6 @@ from coneskin.skin.wire import FRAME_LENGTHS, Status, encode
 from .circuit import ConverterInputs, LayerContact, frame_of, measure
 from .ladder import ResistorLadder
 
-__all__ = ["PlaceFrames"]
-
 _NOISE_COUNTS = 0.5  # counts; a reading without noise would be STUCK
 _MAX_LEVEL = 0.97  # level; the layers are never joined without any resistance
 _CACHE_SIZE = 64  # places whose readings are kept

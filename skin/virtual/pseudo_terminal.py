@@ -14,9 +14,6 @@ from coneskin.skin.sources.source import Openable
 
 from .skin import VirtualSkin
 
-__all__ = ["Pacing", "PseudoTerminal", "open_raw_terminal", "play", "wait_for_reader", "write_all"]
-
-
 _OPENING_TIME = 0.05  # s; a reader may throw away what came while it was opening, as pyserial does
 _LOOK_PERIOD = 0.005  # s between two looks for a reader
 _PACKET_MODE = (1).to_bytes(4, sys.byteorder)  # of tty_ioctl(2): our end is told when the reader has thrown bytes away

@@ -13,8 +13,6 @@ from coneskin.skin.sensor import Sensor
 
 from .imperfections import Foam
 
-__all__ = ["PlacedTouch", "ScriptedTouch", "across_seam", "clamp", "fingers", "grip", "palm_over_seam"]
-
 _MEMORY_TIMES = 40.0  # relaxation times; after them nothing is left of a touch
 
 

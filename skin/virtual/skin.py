@@ -22,8 +22,6 @@ from .imperfections import Imperfections
 from .ladder import RIGHT_WIRES, RewiredSheets
 from .scripted_touch import PlacedTouch, ScriptedTouch, across_seam
 
-__all__ = ["MODELS", "Press", "PressedSkin", "VirtualSkin"]
-
 MODELS = ("field", "ladder")
 _CURRENT_NAMES = frozenset({"touch_current", "radial_current", "angular_current"})  # the rest are potentials
 _GUIDE_NAMES = frozenset({"touch_c", "touch_d", "radial_c", "radial_d", "angular_a", "angular_b"})

@@ -15,8 +15,6 @@ from .circuit import WiringFaults
 from .fault_injection import FaultInjection
 from .scripted_touch import ScriptedTouch, fingers, grip, palm_over_seam
 
-__all__ = ["FAULT_NAMES", "FLAW_NAMES", "TOUCH_SHAPES", "parse_fault", "parse_flaw", "parse_press", "read_script"]
-
 _MAX_SCRIPT = 1 << 20  # bytes of a script
 _PALM_RADIUS = 0.03  # m; radius of its face
 _FINGER_OFFSETS = ((-0.02, 0.0), (0.0, 0.0), (0.02, 0.0))  # m; three, 20 mm apart along the link

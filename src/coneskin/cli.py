@@ -15,8 +15,6 @@ from .core.help_text import HelpFormatter
 from .core.text import printable
 from .core.version import __version__, code_build
 
-__all__ = ["COMMANDS", "main"]
-
 _SHELLS = ("bash", "zsh", "fish", "powershell")
 _COMPLETION_VARIABLE = "_ARGCOMPLETE"  # set by the code of the shell
 _LINE_VARIABLE = "COMP_LINE"  # what was typed so far

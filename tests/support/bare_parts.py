@@ -14,8 +14,6 @@ from coneskin.robot.arm.vectors import cross, dot, minus, scaled
 from coneskin.robot.arm.workspace import arm_parts
 from coneskin.scene.values.scene import Scene
 
-__all__ = ["bare_parts_of"]
-
 _INSIDE = 0.008  # m by which a bare tube is thinner than the skin around it
 
 

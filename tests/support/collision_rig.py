@@ -37,8 +37,6 @@ from coneskin.skin.virtual.skin import Press, PressedSkin
 
 from .pressing_body import Body, Pressing
 
-__all__ = ["CollisionRig", "SkinOnLink"]
-
 STEP = 0.001  # s; a frame of each sensor, and a look of the guard
 _LATE = 5  # steps from a command to the control cycle that obeys it
 RUN_UP = 0.3  # s for which the arm moves before it collides

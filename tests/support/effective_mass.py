@@ -14,8 +14,6 @@ from coneskin.robot.arm.inertia import ArmInertia, mass_matrix
 from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.model import ArmModel
 
-__all__ = ["effective_mass"]
-
 
 def effective_mass(
     model: ArmModel, inertia: ArmInertia, q: Sequence[float], link: int, p_link: Vector, direction: Vector

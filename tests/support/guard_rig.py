@@ -37,8 +37,6 @@ from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 
-__all__ = ["CONE", "LINK", "MODEL", "START_Q", "GuardRig", "felt", "make_core", "touch"]
-
 _PUSH = 300.0  # N
 _LEAVES = 0.05  # rad/s at which the arm leaves what has touched it
 

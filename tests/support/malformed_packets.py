@@ -8,8 +8,6 @@ from collections.abc import Callable
 
 from coneskin.robot.ur.rtde_codec import VARIABLES, PacketKind
 
-__all__ = ["SERVICES", "malformed_packet"]
-
 _KINDS = tuple(int(kind) for kind in PacketKind)
 _NAMES = tuple(VARIABLES)
 _COMMANDS = ("load", "play", "pause", "popup", "addToLog", "programState", "get variable", "saveLog", "setUserRole")

@@ -12,8 +12,6 @@ from coneskin.core.errors import MissingExtra
 from coneskin.robot.arm.inertia import ArmInertia
 from coneskin.robot.arm.model import ArmModel
 
-__all__ = ["load_pinocchio", "pin_arm", "pin_jacobian", "pin_mass_matrix", "pin_place", "pin_rotation", "pin_torques"]
-
 
 @functools.cache
 def load_pinocchio() -> Any:

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
 
-__all__ = ["part_velocity", "plant_mass_matrix", "plant_momentum", "switch_off"]
-
 
 def switch_off(plant: MujocoPlant, joints: Sequence[int]) -> None:
     """Switch the servos of joints off, numbered from 0."""

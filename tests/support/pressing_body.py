@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 
 from coneskin.geometry.pose import Pose, Vector
 
-__all__ = ["Body", "Pressing"]
-
 
 @dataclass(frozen=True, slots=True)
 class Body:

@@ -13,8 +13,6 @@ from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
 from coneskin.robot.reaction.retreat import RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity
 
-__all__ = ["FollowedRetreat", "follow", "joints_within", "touch"]
-
 _CYCLE = 0.002  # s
 
 

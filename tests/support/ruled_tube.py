@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.pose import Pose
 
-__all__ = ["RuledTube", "ellipse_section", "oval_tube", "rounded_box_section", "stadium_section"]
-
 Floats = NDArray[np.float64]
 Section = Callable[[Floats], Floats]  #: parts of the way around, from 0 to 1, to points (n, 2) [m], counter-clockwise
 

@@ -18,8 +18,6 @@ from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.sim.server import Server
 
-__all__ = ["ServedController", "served"]
-
 
 class ServedController:
     """Address of a controller that is served, its log, and the faults that it takes."""

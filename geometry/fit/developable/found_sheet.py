@@ -28,17 +28,6 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from .ruling_candidates import RulingCandidate
 from .side_fit import fit_developable
 
-__all__ = [
-    "FoundSheet",
-    "RuledRegion",
-    "columns_of",
-    "covered_by",
-    "fit_sheet",
-    "hull_points",
-    "ruled_profile",
-    "widest_region",
-]
-
 Floats = NDArray[np.float64]
 
 

@@ -32,8 +32,6 @@ from .found_sheet import (
 )
 from .ruling_candidates import RulingCandidate, find_ruling_candidates
 
-__all__ = ["find_sheets", "with_developables"]
-
 
 def _bare_beside(
     sheets: Sequence[FittedSheet],

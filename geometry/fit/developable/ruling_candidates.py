@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 from coneskin.geometry.fit.candidates import AxisCandidate
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 
-__all__ = ["RulingCandidate", "find_ruling_candidates"]
-
 Floats = NDArray[np.float64]
 
 _DRAW_COUNT = 1600  # pairs, and triples, of samples

@@ -13,8 +13,6 @@ from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 
-__all__ = ["fit_developable"]
-
 Floats = NDArray[np.float64]
 
 _STRIPS_PER_TURN = 64  # around a full turn; the section of a stadium of 40 mm is then within 0.03 mm

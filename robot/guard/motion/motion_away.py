@@ -16,8 +16,6 @@ from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reactio
 if TYPE_CHECKING:  # a reaction that only stops loads it not
     from .setpoint_stream import MotionStream, ReactionPlanner
 
-__all__ = ["MotionAway"]
-
 
 class _Decision(NamedTuple):
     """Decision about an arm that stands.

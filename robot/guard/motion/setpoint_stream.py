@@ -22,8 +22,6 @@ from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
-__all__ = ["MotionStream", "ReactionPlanner"]
-
 _SPEED_TOLERANCE = 0.03  # rad/s; absolute part of the tolerance of a joint's speed
 _RELATIVE_TOLERANCE = 0.3  # ratio; its relative part, to the leading joint's commanded speed
 _MAX_DEVIATION_TIME = 0.25  # s for which a joint may be out of tolerance

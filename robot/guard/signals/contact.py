@@ -13,8 +13,6 @@ from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.skin.detection.events import TouchEvent
 from coneskin.skin.detection.frame.reading import TouchReading
 
-__all__ = ["Contact", "GuardedSensor", "TouchRecord"]
-
 _CHI_SQUARED_95 = 5.991  # chi-squared of two degrees of freedom that holds 95 %
 _AXIS_STEP = 1e-4  # m along, rad around; from the place to one that shows the direction
 

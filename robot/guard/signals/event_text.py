@@ -10,8 +10,6 @@ from typing import Any
 from coneskin.core.text import printable
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way
 
-__all__ = ["EventLines", "describe"]
-
 _END_CAUSE = "the guard was told to end"  # on purpose: no reset is needed
 _RELEASE_CAUSE = "the touch is over"  # ends only the motion of an arm that gives way
 _TOUCH_WORDS = {

@@ -21,8 +21,6 @@ from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.reaction.types import ContactOnLink
 
-__all__ = ["MAX_UNEXPLAINED", "TORQUE_PER_AMPERE", "OutsideTorque", "ResistanceMonitor", "push_torque"]
-
 # compiled by mypyc, a Final tuple of floats counts as never set: these three are none
 
 #: N m/A of each joint. Assumed, not measured on an arm

@@ -24,31 +24,6 @@ from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram,
 if TYPE_CHECKING:
     from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StopProgram
 
-__all__ = [
-    "INPUTS",
-    "SESSION_EVENTS",
-    "TOUCH_CAUSE",
-    "BlockKind",
-    "Command",
-    "EventFolding",
-    "EventName",
-    "GuardEvent",
-    "Output",
-    "Outputs",
-    "RecordingOverflowFilter",
-    "body_places",
-    "contact_force",
-    "decode_event",
-    "decode_loss",
-    "describe_way",
-    "emit",
-    "encode_command",
-    "encode_loss",
-    "force_block",
-    "stopping_contact",
-]
-
-
 #: ``why`` of a stop for a touch; what else is there stops the arm without a ``Collision``
 TOUCH_CAUSE = "touch"
 

@@ -15,8 +15,6 @@ from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.compiled_kinematics import compile_contact
 from coneskin.robot.arm.model import ArmModel
 
-__all__ = ["PermissiblePatch", "PermissibleSpeeds", "SurfaceSpeeds"]
-
 
 @dataclass(frozen=True, slots=True)
 class PermissiblePatch:

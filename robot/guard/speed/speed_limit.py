@@ -21,8 +21,6 @@ from coneskin.robot.guard.signals.journal import EventName, Outputs, emit
 
 from .permissible_speeds import PermissibleSpeeds, SurfaceSpeeds
 
-__all__ = ["SpeedLimit"]
-
 _READ_TOLERANCE = 0.01  # of the slider; between what was set and what is read
 _READ_DELAY = 0.5  # s after which it must show what was set
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:  # a scene without a slow reaction does not load it
     from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
     from coneskin.robot.reaction.contact_supervision import ContactApproach
 
-__all__ = ["CLEAR_TIME", "SpeedReduction"]
-
 CLEAR_TIME = 0.5  #: s without a touch after which the arm goes on at the speed it had
 _MAX_SPEED_RATIO = 0.9  # ratio; speed after the reduction to speed at the touch
 _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its setting

@@ -38,8 +38,6 @@ from .moves import MoveFunctions, Wait
 from .socket_functions import SocketFunctions
 from .states import PopupNotice, TextNotice
 
-__all__ = ["Builtins"]
-
 _NOT_SIMULATED = (math.nan,) * 6  # value of what is not simulated, for six joints
 
 

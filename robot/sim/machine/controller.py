@@ -36,8 +36,6 @@ from .states import (
     SafetyNotice,
 )
 
-__all__ = ["POWER_COMMANDS", "Controller"]
-
 _PLANT_LOST = 50  # number in the log; that of a real controller which loses its arm depends on the joint
 
 

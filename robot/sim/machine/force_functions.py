@@ -18,8 +18,6 @@ from coneskin.robot.sim.urscript.values import Array, ScriptError, number, numbe
 from .script_host import CallingProgram, ScriptHost
 from .states import ErrorNotice, Report
 
-__all__ = ["ForceFunctions"]
-
 _NOT_SIMULATED = 0  # number of a log entry that only this simulator writes
 
 

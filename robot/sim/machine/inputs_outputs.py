@@ -12,8 +12,6 @@ from coneskin.core.errors import RobotRefused
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.ur.rtde_codec import VARIABLES, Value
 
-__all__ = ["CURRENT", "INPUTS", "VOLTAGE", "ClientInputs", "InputWatchdog", "Terminals", "digital_outputs"]
-
 #: registers in which ur_rtde writes the number of a command, with register offset 0 and 24
 _COMMAND_REGISTERS = ("input_int_register_0", "input_int_register_24")
 

@@ -17,8 +17,6 @@ from coneskin.robot.ur.rtde_codec import VARIABLES
 from .inputs_outputs import CURRENT, VOLTAGE
 from .script_host import ScriptHost
 
-__all__ = ["IoFunctions", "index_of"]
-
 _REGISTERS, _BITS = 48, 128
 _INPUT_ACTION_NAMES = ("pause", "stop", "ignore")
 

@@ -18,8 +18,6 @@ from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, nu
 
 from .script_host import CallingProgram, ScriptHost
 
-__all__ = ["MoveFunctions", "Wait"]
-
 Wait = Generator[None, None, None]
 
 

@@ -19,8 +19,6 @@ from .builtins import Builtins
 from .script_host import ScriptHost
 from .script_socket import ScriptSocket
 
-__all__ = ["Program", "Thread"]
-
 _MAX_STEPS = 100_000  # iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
 _MAX_TURN_TIME = 0.1  # s of the processor that a program may use in one cycle, likewise
 _MAX_THREADS = 100  # of a program, with those that have ended in this cycle

@@ -15,8 +15,6 @@ from .inputs_outputs import ClientInputs, Terminals
 from .script_socket import ScriptSocket
 from .states import Notice
 
-__all__ = ["CallingProgram", "ScriptHost"]
-
 
 class CallingProgram(Protocol):
     """Program that calls a URScript function."""

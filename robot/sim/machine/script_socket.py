@@ -9,8 +9,6 @@ import socket
 
 from coneskin.robot.sim.urscript.values import ScriptError
 
-__all__ = ["ScriptSocket", "may_connect"]
-
 _PENDING_ERRORS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 _MAX_UNREAD = 65_536  # bytes that have come and that the program has not read; more wait in the network
 _MAX_READS = 10  # of one connection in a control cycle; an assumption, so that a program that is sent more gives way

@@ -21,8 +21,6 @@ from coneskin.robot.sim.urscript.values import Array, ScriptError, number, show
 from .script_host import CallingProgram, ScriptHost
 from .script_socket import ScriptSocket, may_connect
 
-__all__ = ["SocketFunctions"]
-
 _MAX_SOCKETS = 32  # of one program, at once; an assumption
 _MAX_VALUES = 30  # of one read
 MAX_LINE = 1023  #: characters that socket_read_line and socket_read_string return

@@ -12,29 +12,6 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Literal
 
-__all__ = [
-    "DEFAULT_MODEL",
-    "FIRST_X",
-    "MOVING",
-    "PORTS",
-    "START_Q",
-    "ErrorNotice",
-    "Notice",
-    "Options",
-    "PopupNotice",
-    "ProgramFailed",
-    "ProgramNotice",
-    "Report",
-    "RobotMode",
-    "Runtime",
-    "SafetyMode",
-    "SafetyNotice",
-    "TextNotice",
-    "Version",
-    "robot_bits",
-    "safety_bits",
-]
-
 
 class Runtime(IntEnum):
     """State of the program: RTDE's runtime_state."""

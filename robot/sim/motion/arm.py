@@ -27,22 +27,6 @@ from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
 
 from .plant import KinematicPlant, PlantState
 
-__all__ = [
-    "CONTROLLER_DECELERATION",
-    "CYCLE",
-    "INVALID_SETPOINT",
-    "JOINT_ACCELERATION",
-    "MAX_ACCELERATION",
-    "SUDDEN_CHANGE",
-    "TRIGGERED",
-    "Motion",
-    "MotionFault",
-    "SimulatedArm",
-    "StopCause",
-    "integrate",
-    "max_abs",
-]
-
 _JOINT_NAMES = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
 
 

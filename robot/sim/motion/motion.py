@@ -21,8 +21,6 @@ from .arm import (
     max_abs,
 )
 
-__all__ = ["ServoJoints", "SpeedJoints", "SpeedTool", "StopJoints", "StopTool"]
-
 
 class _Sustained:
     """Motion that goes on while the program repeats its command.

@@ -27,8 +27,6 @@ from .arm import (
     max_abs,
 )
 
-__all__ = ["JointLine", "Path", "ToolArc", "ToolLine"]
-
 
 class _Profile:
     """Trapezoidal speed profile, computed cycle by cycle so that the slider and a pause can act on it."""

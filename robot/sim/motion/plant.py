@@ -12,8 +12,6 @@ from typing import NamedTuple, Protocol
 
 from coneskin.robot.arm.kinematics import JOINTS
 
-__all__ = ["KinematicPlant", "Plant", "PlantLost", "PlantState"]
-
 _NO_CURRENT = (0.0,) * JOINTS
 
 

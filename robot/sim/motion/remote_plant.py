@@ -20,8 +20,6 @@ from coneskin.robot.arm.model import ArmModel
 from .arm import CYCLE
 from .plant import PlantLost, PlantState
 
-__all__ = ["RemotePlant", "decode_targets", "encode_state"]
-
 #: s that a plant may be behind; as long as a pseudo-terminal on a busy computer can stall
 _MAX_LAG = 0.25
 #: what no arm that is whole measures: joints turn twice at most. A blow of 7 kN takes 800 A

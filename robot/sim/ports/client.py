@@ -6,8 +6,6 @@ import socket
 import time
 from collections.abc import Callable
 
-__all__ = ["MAX_LINE", "MAX_MESSAGES", "UNREAD_TIMEOUT", "Client", "LineReader"]
-
 MAX_LINE = 10_000  #: bytes of a line to the dashboard
 _MAX_UNSENT = 1_000_000  # bytes that a client may leave unread
 MAX_MESSAGES = 100_000  #: bytes that a client may leave unread and still be sent messages

@@ -40,12 +40,6 @@ from coneskin.robot.sim.motion.arm import JOINT_ACCELERATION
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
 from coneskin.robot.sim.urscript.values import values_of
 
-__all__ = [
-    "ROBOT_STATE",
-    "Publisher",
-    "ScriptPort",
-]
-
 MESSAGE = 20  #: kind of a packet that holds one message
 _TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE, _ERROR_MESSAGE, _KEY_MESSAGE, _FAILED_MESSAGE = (
     0,

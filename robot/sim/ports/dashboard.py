@@ -16,8 +16,6 @@ from coneskin.robot.sim.urscript.values import ScriptError
 from .rtde import BUGFIX_VERSION, BUILD_NUMBER
 from .user_interface import NO_MODE, SERIAL_NUMBER, UserInterface
 
-__all__ = ["WELCOME", "Dashboard", "available"]
-
 #: line that the server sends when a client connects
 WELCOME = "Connected: Universal Robots Dashboard Server"
 #: reply to an unlock that comes too early

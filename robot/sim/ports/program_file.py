@@ -17,8 +17,6 @@ from coneskin.core.files import read_file
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
 from coneskin.robot.sim.urscript.values import ScriptError
 
-__all__ = ["EXTERNAL_CONTROL", "ProgramFile", "ProgramFolder"]
-
 #: line that stands for the script of an External Control node until ``play`` has asked for it
 EXTERNAL_CONTROL = "# script of the node External Control"
 _EXTERNAL_CONTROL_CLASS = "com.fzi.externalcontrol.ExternalControlNode"

@@ -34,8 +34,6 @@ from coneskin.robot.ur.rtde_codec import (
     split_names,
 )
 
-__all__ = ["RtdeOutputs", "RtdeSession", "available"]
-
 _ELBOW_FRAME = 2  # number of the frame at the elbow
 _JOINT_OFF = 239
 _JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}  # of joints, and of the tool

@@ -23,8 +23,6 @@ from coneskin.robot.sim.urscript.values import ScriptError
 
 from .program_file import EXTERNAL_CONTROL, ProgramFile, ProgramFolder
 
-__all__ = ["SERIAL_NUMBER", "UserInterface"]
-
 _SCRIPT_REQUEST = b"request_program\n"
 _CONNECT_TIMEOUT = 2.0  # s
 _FIRST_TIMEOUT = 2.0  # s; until the script begins to come

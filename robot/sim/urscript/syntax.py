@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 
 from .values import MAX_ITEMS, ScriptError
 
-__all__ = ["Function", "Parser", "numbered_lines"]
-
 _UNFINISHED_LINE = re.compile(r"(?:,|\b(?:and|or|xor|not))$")  # end of a line that goes on in the next
 _LEADING_NUMBER = re.compile(r"[-+]?[\d.eE]+")
 _QUOTED_TEXT = re.compile(r"\"[^\"]*\"|'[^']*'")

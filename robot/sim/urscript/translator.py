@@ -24,8 +24,6 @@ from typing import Any
 from .syntax import Function, Parser, numbered_lines
 from .values import ScriptError
 
-__all__ = ["MAX_LENGTH", "Translation", "complete_programs", "translate"]
-
 _BY_SUBJECT = {
     "field buses": """modbus_add_rw_signal modbus_add_signal modbus_delete_signal modbus_get_error
         modbus_get_signal_status modbus_get_time_since_signal_invalid modbus_reset_connection

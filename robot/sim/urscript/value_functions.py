@@ -25,8 +25,6 @@ from .values import (
     values_of,
 )
 
-__all__ = ["ValueFunctions", "text_of"]
-
 
 class ValueFunctions:
     """URScript functions of poses, lists, numbers and texts; places in a text are counted from 0."""

@@ -13,20 +13,6 @@ from typing import Any
 
 from coneskin.geometry.pose import Pose, Vector
 
-__all__ = [
-    "OPERATIONS",
-    "Array",
-    "PoseValue",
-    "ScriptError",
-    "interpolate",
-    "make_list",
-    "number",
-    "numbers",
-    "pose_of",
-    "show",
-    "values_of",
-]
-
 _MAX_NUMBER = 1e6  # of a position, a speed, a time, an acceleration
 _MAX_ITEMS_SHOWN, _MAX_TEXT_SHOWN = 50, 1000  # elements of a list, characters of a text
 

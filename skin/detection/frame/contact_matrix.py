@@ -23,8 +23,6 @@ from typing import Final, NamedTuple
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, Frame
 
-__all__ = ["ContactMatrix", "FrameInversion", "FrameNoise", "MatrixNoise"]
-
 _MIN_CONDUCTANCE: Final = 1e-9  # S; a conductance below this is none
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from enum import Enum
 
-__all__ = ["Fault"]
-
 
 class Fault(Enum):
     """A reason why a reading must not be taken for "no touch". The value is the sentence for people."""

@@ -15,8 +15,6 @@ from coneskin.skin.wire import Frame, Status
 from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 
-__all__ = ["Reading", "TouchReading", "read"]
-
 
 class TouchReading(NamedTuple):
     """One frame of a touch. Events come only where something changes. This comes with every frame."""

@@ -9,8 +9,6 @@ from coneskin.core.errors import SensorError
 
 from .timing import TimingLimits
 
-__all__ = ["DetectorSettings"]
-
 
 @dataclass(frozen=True, slots=True)
 class DetectorSettings:

@@ -14,8 +14,6 @@ from coneskin.core.errors import SensorError
 
 from .faults import Fault
 
-__all__ = ["FrameTiming", "TimingLimits"]
-
 _LEARNING_FRAMES: Final = 16  # frames; from then on the period is known well enough to judge by
 _BACKLOG_TIME: Final = (
     0.25  # s; in it what had piled up before the port was opened is read, and looks like a fast clock

@@ -24,8 +24,6 @@ from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 from .settings import DetectorSettings
 
-__all__ = ["UntouchedCurrents", "UntouchedGuides", "UntouchedLeak", "UntouchedLevel"]
-
 CURRENT_BLOCK: Final = (
     32  # frames that are averaged at once; noise that lasts as long, as mains hum, shows in the means
 )

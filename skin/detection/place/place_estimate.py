@@ -31,12 +31,6 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.sheet_functions import RobinFunction
 from coneskin.skin.tolerance import PlaceFloor
 
-__all__ = [
-    "PlaceEstimate",
-    "PlaceEstimator",
-    "SheetConductances",
-]
-
 _USUAL_RADIUS = math.log(0.005)  # ln m; radius of a usual contact, a fingertip's
 _WEIGHT_RADIUS = 1.0  # of ln a: one over its variance
 _MIN_RADIUS, _MAX_RADIUS = math.log(0.0005), math.log(0.03)  # ln m

@@ -23,11 +23,6 @@ from coneskin.skin.sensor import Sensor
 from .place_estimate import PlaceEstimator, SheetConductances
 from .single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES
 
-__all__ = [
-    "SeamCertainty",
-    "SeamPlace",
-]
-
 _MAX_GAP = math.radians(24.0)  # between the straight edges; beyond, the wrap does not close
 _MIN_FAR_SHARE = 0.05  # P_yy over G below which hardly anything is on the other side of the seam
 _SEAM_DISTANCE = 0.5  # of the spread about the electrical centre; contacts that are nearer to the seam belong to it

@@ -21,16 +21,6 @@ from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
-__all__ = [
-    "CONTRADICTS",
-    "DANGEROUS_ANGLE",
-    "MOVES",
-    "WEAK",
-    "SingleContactTest",
-    "frames_until_certain",
-    "weakest_pair_excluded",
-]
-
 WEAK = "it presses too lightly for a place"  #: below the level from which places are told
 CONTRADICTS = "the guides of a phase differ too much for one contact"  #: the frame itself
 MOVES = "it has only begun, or moves"  #: the place is not that of the frame before

@@ -16,8 +16,6 @@ from typing import Final
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, MatrixNoise
 
-__all__ = ["TouchFilter"]
-
 _MEMORY_FRAMES: Final = 128.0  # frames that the sums stand for at most
 _SMOOTHING_GAIN: Final = 0.125  # of the distance to the prediction; its variance is 1/15 of a frame's
 _SMOOTHED_VARIANCE: Final = _SMOOTHING_GAIN / (2.0 - _SMOOTHING_GAIN)

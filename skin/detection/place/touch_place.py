@@ -22,10 +22,6 @@ from .seam_contact import SeamCertainty, SeamPlace
 from .single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES, WEAK, SingleContactTest
 from .touch_filter import TouchFilter
 
-__all__ = [
-    "TouchPlace",
-]
-
 _FLOOR_FRAMES = 128  # frames; no estimate is made anew for more
 _HUM_QUARTER = 0.005  # s; of a period of 50 Hz, in which hum is alike
 _NORMAL_DEVIATIONS = 3.0  # standard deviations within which the normal of a certain place is known to DANGEROUS_ANGLE

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["add_arguments", "run"]
-
 _DEFAULT_FOLDER = "calibrations"
 #: of a calibration, in the JSON object of its result
 _SHOWN_FIELDS = (

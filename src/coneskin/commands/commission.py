@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from coneskin.commissioning.acceptance.procedure import Procedure
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

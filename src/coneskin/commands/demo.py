@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
-__all__ = ["add_arguments", "run"]
-
 #: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
 #: silence are long because a pseudo-terminal on a busy machine can stall for that long
 _SCENE_TEXT = """\

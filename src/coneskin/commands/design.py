@@ -44,8 +44,6 @@ from coneskin.skin.electronics import shunt_ohms
 from .dimensions import add_key_options, given_keys, option_name
 from .terminal import ending_signals, print_hint
 
-__all__ = ["add_arguments", "run"]
-
 _NO_FIT_EXIT_CODE = 3
 _LEAST_BRIDGED_SHARE = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
 #: keys of design.toml that have an option of their own

@@ -9,8 +9,6 @@ from typing import Any
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.keys import Key, check
 
-__all__ = ["add_key_options", "given_keys", "option_name"]
-
 
 def option_name(key: Key) -> str:
     """Return the option for a key: ``--radius1-mm`` for ``radius1_mm``."""

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
     from coneskin.core.finding import Finding
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["add_arguments", "run"]
-
 _HOLD_UP_TIME = 10.0  # s
 _VERDICT_COLORS = {"ok": "green", "warning": "yellow", "bad": "red", "not tried": "blue"}
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from coneskin.skin.field.maps import ErrorMap
     from coneskin.skin.field.model import FieldModel
 
-__all__ = ["add_arguments", "run"]
-
 _ADC_OHMS = 1e9  # an input of the converter, which fixes a guide
 _PICTURES = ("potential_radial", "potential_angular", "error_u", "error_phi")
 

@@ -23,8 +23,6 @@ from coneskin.core.text import positive_seconds
 if TYPE_CHECKING:
     from coneskin.skin.sources.serial_port import PortFacts
 
-__all__ = ["add_arguments", "run"]
-
 _POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
 

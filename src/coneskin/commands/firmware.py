@@ -18,8 +18,6 @@ from pathlib import Path
 
 from coneskin.core.errors import GeometryError, SceneError
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

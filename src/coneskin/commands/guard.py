@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from coneskin.session.event_publisher import EventPublisher
     from coneskin.session.session import Session
 
-__all__ = ["add_arguments", "run"]
-
 _START_TIMEOUT = 20.0  # s for the guard to become active
 _LINE_PAUSE = 0.3  # s without a line after which all earlier ones have been read
 

@@ -16,8 +16,6 @@ from pathlib import Path
 
 from coneskin.core.errors import RobotRefused
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

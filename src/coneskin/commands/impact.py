@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from coneskin.impact.simulation.impact_outcome import ImpactOutcome
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["add_arguments", "run"]
-
 _REACTION_NAMES = ("stop", "retreat", "comply", "slow")
 _NO_GUARD = ("force limit", "nothing")
 _STOP_WAYS = ("guard", *_REACTION_NAMES, *_NO_GUARD)

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from coneskin.design.first_scene import ArmAddress, DesignFolder
     from coneskin.skin.firmware.board_circuit import BoardCircuit
 
-__all__ = ["add_arguments", "run"]
-
 _SIMULATED_HOST = "127.0.0.1"
 
 

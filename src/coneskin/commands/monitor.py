@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from coneskin.commissioning.line.line import Line
     from coneskin.commissioning.line.line_monitor import LineMonitor, LineReport
 
-__all__ = ["add_arguments", "run"]
-
 _FIRST_PERIOD = 1.5  # s until the first diagnosis
 _LINE_PERIOD, _SCREEN_PERIOD = 1.0, 0.25  # s
 _READ_TIMEOUT = 0.05  # s

@@ -28,8 +28,6 @@ from .terminal import print_hint
 if TYPE_CHECKING:
     from coneskin.impact.permissible_speed.speed_map import SpeedMap
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

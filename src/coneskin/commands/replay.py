@@ -36,8 +36,6 @@ from coneskin.core.text import printable
 if TYPE_CHECKING:
     from coneskin.runs.replay.run import Replay
 
-__all__ = ["add_arguments", "run"]
-
 _EXIT_CODES = {"same": 0, "different": 1, "incomplete": 4}  # by verdict
 
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from coneskin.runs.decisions import Decisions
     from coneskin.runs.replay.run import Run
 
-__all__ = ["INCOMPLETE", "add_arguments", "run"]
-
 INCOMPLETE = 4  #: exit code for a run that is not whole
 
 #: job -> what it does, its examples, and its exit codes

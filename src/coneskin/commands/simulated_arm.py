@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from coneskin.robot.sim.process import SimulatedController
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["simulated_arm"]
-
 
 @contextmanager
 def simulated_arm(scene: Scene, bodies: bool = False) -> Iterator[socket.socket | None]:

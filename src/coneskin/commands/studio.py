@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from coneskin.design.link_design import LinkMesh
     from coneskin.design.studio.workbench import Workbench
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

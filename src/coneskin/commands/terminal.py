@@ -22,17 +22,6 @@ if TYPE_CHECKING:
     from coneskin.commissioning.touching import Notice
     from coneskin.skin.detection.frame.reading import TouchReading
 
-__all__ = [
-    "LiveReading",
-    "Person",
-    "add_page_options",
-    "ending_signals",
-    "print_hint",
-    "print_line",
-    "show_page",
-    "typed_lines",
-]
-
 
 def print_hint(text: str) -> None:
     """Print a line with a command, unless what is pasted would be another one.

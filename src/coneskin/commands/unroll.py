@@ -19,8 +19,6 @@ from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
 from .dimensions import add_key_options, given_keys
 
-__all__ = ["add_arguments", "run"]
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from coneskin.view.page_server import PageServer
     from coneskin.view.stage.stage import Stage
 
-__all__ = ["add_arguments", "run"]
-
 _PAGE_WORDS = "the page is at {} (Ctrl-C ends it); it is no safety display"
 _NICE_LEVEL = 10  # by how much the page of a running guard steps back for it: no picture is worth a late stop
 

@@ -16,18 +16,6 @@ from coneskin.scene.commissioning_record import MAX_MISS
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = [
-    "RIGHT",
-    "Place",
-    "explain",
-    "misfit",
-    "misread",
-    "miss",
-    "power",
-    "shifts",
-    "tolerance",
-]
-
 _FULL_TURN = 2.0 * math.pi  # rad
 _MAX_PART = 0.2  # part of the slant, and of the wrap: how well a person finds a mark on a small sensor
 _MIN_OFFSET_READINGS = 3  # readings; fewer can be explained by an offset too easily

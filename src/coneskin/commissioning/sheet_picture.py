@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum
 
-__all__ = ["OUTLINE", "draw_sheet"]
-
 OUTLINE = "#222222"  #: colour of lines and letters
 _SHEET_COLOR = "#9fd3c7"
 _CURVE_POINTS = 61  # of a curve

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["SkinWatch", "TouchSession", "check_touchable", "start_skin"]
-
 _FRAME_TIMEOUT = 30.0  # s that frames may be late or missing: nothing is guarded, and a late place is as good
 _READY_TIMEOUT = 10.0  # s for every sensor to send a run of good frames
 _POLL_PERIOD = 0.02  # s between two looks at what is not skin

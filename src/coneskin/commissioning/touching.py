@@ -17,8 +17,6 @@ from .misreadings import Place
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["REQUESTS", "Doubt", "Held", "Mark", "Notice", "TouchJudge", "Touching"]
-
 Reading = TypeVar("Reading")
 REQUESTS = ("mark", "again", "press")  #: kinds of notice on which the person touches the skin
 

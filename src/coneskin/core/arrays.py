@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import GeometryError
 
-__all__ = ["Complex", "Floats", "Ints", "frozen"]
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]

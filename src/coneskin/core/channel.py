@@ -23,15 +23,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, Protocol, TypeVar
 
-__all__ = [
-    "Channel",
-    "decode_json",
-    "encode_json",
-    "pair",
-    "wait_readable",
-    "wait_writable",
-]
-
 _LENGTH_FIELD = struct.Struct("<I")
 _MAX_LENGTH = 1 << 24  # bytes of one message
 _MAX_WAITING = 1 << 22  # bytes that the other side has not taken

@@ -30,8 +30,6 @@ from .errors import RobotConnectionError
 if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to import
     import subprocess
 
-__all__ = ["Lifeline", "OwnedProcess", "inherit", "shorten_time_slice", "spawn"]
-
 _END_TIMEOUT = 2.0  # s for a process to end by itself
 _LENGTH_FIELD = struct.Struct("<I")  # of what a child is told over its standard input
 

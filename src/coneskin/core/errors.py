@@ -28,26 +28,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = [
-    "Collision",
-    "ConeSkinError",
-    "FieldError",
-    "GeometryError",
-    "KinematicsError",
-    "MeshError",
-    "MissingExtra",
-    "RecordingError",
-    "RobotConnectionError",
-    "RobotError",
-    "RobotRefused",
-    "RobotTimeout",
-    "SceneError",
-    "SensorError",
-    "SkinConnectionError",
-    "SkinError",
-    "SkinTimeout",
-]
-
 
 class ConeSkinError(Exception):
     """The root of the tree: catch it to catch everything that coneskin raises on purpose."""

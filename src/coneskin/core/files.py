@@ -14,8 +14,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["draft_of", "open_file", "read_file", "write_whole"]
-
 _FILE_KINDS = {
     stat.S_IFDIR: "a folder",
     stat.S_IFCHR: "a device",

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-__all__ = ["Finding", "Verdict", "exit_code"]
-
 Verdict = Literal["ok", "warning", "bad", "not tried"]
 
 

@@ -6,8 +6,6 @@ import argparse
 import re
 import textwrap
 
-__all__ = ["HelpFormatter"]
-
 _MIN_COLUMN = 24  # letters that a second column needs, or else it goes on below the first
 
 

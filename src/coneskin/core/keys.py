@@ -14,8 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-__all__ = ["Key", "check", "with_meanings"]
-
 _RAD_PER_DEG = math.pi / 180.0  # rad
 _KEY_UNITS: Mapping[str, tuple[float, str]] = {
     "_n_per_mm": (1e3, "N/mm"),

@@ -13,8 +13,6 @@ from .errors import ConeSkinError, MissingExtra
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["degree_ticks", "picture_style", "write_picture"]
-
 _PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 #: of lines that no eye takes for each other (Okabe and Ito 2008), and dashes, for paper without colour
 _LINE_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9", "#E69F00")

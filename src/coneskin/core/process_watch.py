@@ -11,8 +11,6 @@ import os
 from pathlib import Path
 from typing import Final
 
-__all__ = ["ProcessWatch", "load"]
-
 _STAT_BYTES: Final = 400
 _MAX_SHARE: Final = 0.2  # of the time between two looks; a thread that has run for less was waiting
 

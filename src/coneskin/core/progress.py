@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-__all__ = ["Progress", "ProgressBar", "silent"]
-
 Progress = Callable[[float], None]  #: takes the fraction that is done, from 0 to 1
 
 

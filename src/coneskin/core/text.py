@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any, TextIO
 
-__all__ = ["html_card", "painted", "positive_seconds", "printable", "read_json"]
-
 _MAX_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
 _HALF_PAIR = re.compile(rb"\\u[dD][89a-fA-F]")
 _COLOR_CODES = {"red": 31, "green": 32, "yellow": 33, "blue": 34}

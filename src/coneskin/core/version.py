@@ -7,8 +7,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["code_build", "code_versions", "recorded_version", "running_version"]
-
 __version__ = "0.1.0"  # the one place: pyproject.toml reads it from here
 
 _COMMIT_DIGITS = 7  # digits of a commit, for people

@@ -31,8 +31,6 @@ from coneskin.skin.electronics import GivenElectronics
 from .folder import FileOptions
 from .sheets.sheet_design import DesignOptions, JigPlan, JigSurface
 
-__all__ = ["DESIGN_TABLES", "read_settings", "settings_text"]
-
 _DEFAULT_OPTIONS, _DEFAULT_FILES, _PAPER_LAYERS = DesignOptions(), FileOptions(), PAPER_STACK.layers
 _GIVEN_ELECTRONICS = ("supply_v", "adc_v", "adc_bits", "pulldown_ohm", "current_full_scale_ma")
 _GIVEN_SHEETS = ("upper_sheet_ohm", "lower_sheet_ohm")  # they have a default in a scene, and none in a design

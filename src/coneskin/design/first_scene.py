@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from coneskin.skin.firmware.board_circuit import BoardCircuit
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ArmAddress", "DesignFolder", "arm_link", "first_scene", "read_design"]
-
 _MAX_BYTES = 4 << 20  # of design.json
 _TUBE_AXES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
 _FILE_HEAD = """\

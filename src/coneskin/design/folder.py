@@ -40,8 +40,6 @@ if TYPE_CHECKING:
 
 from coneskin.design.sheets.summary import sheet_folder
 
-__all__ = ["DESIGN_FILE", "FileOptions", "check_target", "write_design"]
-
 #: summary of a design; only a folder with this file may be replaced
 DESIGN_FILE = "design.json"
 _MIN_TOLERANCE = 1e-7  # m; a flattened arc of 1 m then has 2000 lines

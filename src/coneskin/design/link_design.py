@@ -25,16 +25,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.touch_weights import TouchWeights
 
-__all__ = [
-    "LinkDesign",
-    "LinkMesh",
-    "NothingFits",
-    "design_link",
-    "find_link_sheets",
-    "load_link",
-    "with_seams",
-]
-
 #: words in the name of a file or folder
 _VISUAL_WORDS, _HULL_WORDS = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)

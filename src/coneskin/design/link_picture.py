@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from .workshop.placement import DatumFace
 
-__all__ = ["draw_jig", "draw_link", "draw_weights"]
-
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 #: one for each reason why a part of a link is bare
 _BARE_COLOURS = ("#c3c8d0", "#ecd28b", "#a9d6ad", "#dbb0d6", "#a8cbee", "#f2b79b", "#b5e0dd", "#d8d3a6")

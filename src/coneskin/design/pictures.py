@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
-__all__ = ["draw_pictures"]
-
 
 def draw_pictures(
     folder: Path,

@@ -19,8 +19,6 @@ from .workshop.build_guide import guide_lines
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
 
-__all__ = ["report_text"]
-
 _ASSEMBLY_WORDS = {
     "loose": "Wrap the layers one after another; each is cut for its own radius.",
     "pairs": "Glue each conductive sheet to its substrate while both are flat, then wrap the pairs.",

@@ -18,8 +18,6 @@ from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text
 from .workshop.build_figures import WIRE_COLOURS, BuildFigures, CableExit, side_name
 
-__all__ = ["FOIL_COLOUR", "INK_COLOUR", "draw_layout", "draw_parts", "draw_seam", "draw_stack"]
-
 INK_COLOUR = "#222222"
 FOIL_COLOUR = "#c27c0e"
 _ACTIVE_COLOUR = "#9fd3c7"

@@ -18,15 +18,6 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from .decisions import SKIN_EVENTS, Decisions, EventPair, first_divergence, pair_events
 from .replay.event_details import Tolerances, describe_differences, distance, milliseconds
 
-__all__ = [
-    "Comparison",
-    "Difference",
-    "compare_decisions",
-    "comparison_facts",
-    "comparison_lines",
-    "without_invented",
-]
-
 _STOP_WINDOW = 0.5  # s between a contact and the stop that is made for it
 _EVENT_WORDS: Mapping[str, str] = {
     EventName.CONTACT: "touch",

@@ -39,8 +39,6 @@ from .replay.event_details import Tolerances
 if TYPE_CHECKING:
     from .replay.run import Run
 
-__all__ = ["CUT_TOLERANCES", "cut_run", "first_touch"]
-
 #: s before the settling of the guard that the skin needs: 50 untouched frames at 200 Hz, and as much again
 _SKIN_SETTLE = 0.5
 #: s of a cut whose duration nobody names

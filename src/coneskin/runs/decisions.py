@@ -30,17 +30,6 @@ if TYPE_CHECKING:
 
     from .replay.run import Run
 
-__all__ = [
-    "SKIN_EVENTS",
-    "Decisions",
-    "EventPair",
-    "decide_again",
-    "first_divergence",
-    "pair_events",
-    "recorded_commands",
-    "recorded_decisions",
-]
-
 _NUMBER_PATTERN = re.compile(r"[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|inf|nan)")
 _SLIDER_WORD = "slider"
 _SPEED_COMMANDS = frozenset({"setpoint", SetJointVelocity.__name__})  # commands of joint speeds

@@ -24,15 +24,6 @@ from .decisions import Decisions, decide_again, recorded_decisions
 from .replay.event_details import Tolerances
 from .replay.run import read_run
 
-__all__ = [
-    "check_golden",
-    "decide_with",
-    "describe_failure",
-    "event_facts",
-    "golden_path",
-    "update_golden",
-]
-
 _MAX_SIZE = 1 << 28  # bytes
 
 

@@ -25,18 +25,6 @@ if TYPE_CHECKING:
     from .decisions import Decisions
     from .replay.event_details import Tolerances
 
-__all__ = [
-    "RecordedRunFile",
-    "RecordedRunItem",
-    "pytest_addoption",
-    "pytest_collect_file",
-    "pytest_configure",
-    "pytest_terminal_summary",
-    "replayed",
-    "sim_ur",
-    "virtual_skin",
-]
-
 _UPDATED_FILES = pytest.StashKey[list[str]]()
 _RUN_FOLDERS = pytest.StashKey[tuple[Path, ...]]()
 

@@ -17,8 +17,6 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName
 if TYPE_CHECKING:
     from .replay.run import Run
 
-__all__ = ["find_recordings", "is_further_part", "is_run", "run_name", "summarise_run"]
-
 _IN_FOLDER = "run.rec"
 _FILE_SUFFIX = ".rec"
 _PART_PATTERN = re.compile(r"(.+)\.\d{4}\.rec")

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from .values.scene import Scene, SpeedLimitScene
 
-__all__ = ["SensorOnArm", "build_core", "build_stream", "place_on_arm", "withheld_motion"]
-
 _MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
 
 

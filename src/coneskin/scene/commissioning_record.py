@@ -22,16 +22,6 @@ from .values.scene import Commissioning, facts_digest, sensor_facts
 if TYPE_CHECKING:
     from .values.scene import PlacedSensor, Scene
 
-__all__ = [
-    "MAX_MISS",
-    "MIN_MARKS",
-    "CommissioningRecord",
-    "MarkResult",
-    "fingerprint",
-    "with_commissioning",
-    "write_record",
-]
-
 MIN_MARKS = 5  #: marks on each sensor
 MAX_MISS = (0.020, math.radians(25.0))  #: m along the link, and rad about it, by which a mark may be misread at most
 _CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void

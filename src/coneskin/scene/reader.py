@@ -24,8 +24,6 @@ from .values import scene as s
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
 
-__all__ = ["TABLES", "load_scene", "parse_scene"]
-
 #: that a scene may have
 TABLES = (
     "arm",

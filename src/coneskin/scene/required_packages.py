@@ -12,8 +12,6 @@ from coneskin.skin.sources.kinds import is_simulated
 if TYPE_CHECKING:
     from .values.scene import Scene
 
-__all__ = ["missing_packages", "require_packages", "required_packages"]
-
 
 def required_packages(scene: Scene) -> dict[str, str]:
     """Return what guarding the scene imports: module -> the package to install."""

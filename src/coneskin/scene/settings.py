@@ -23,15 +23,6 @@ from .values.scene import sensor_facts
 if TYPE_CHECKING:
     from .values.scene import Scene
 
-__all__ = [
-    "changed_settings",
-    "override_detector",
-    "override_settings",
-    "parse_choices",
-    "parse_settings",
-    "resolved_settings",
-]
-
 _NAME_EXAMPLE = (
     "write reaction.kind=stop, monitoring.settle_ms=100, reaction.rule.0.kind=slow, sensor.0.touch_level=0.08, "
     "detection.touch_level=0.08 for all sensors, or detector.release_frames=5"

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from .values.scene import PlacedSensor, Scene
 
-__all__ = ["missing_parts", "summarize"]
-
 #: arm.controller_heartbeat -> what it means
 _HEARTBEAT_WORDS = {
     "required": "a program on the controller must depend on the guard's heartbeat (coneskin heartbeat)",

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from .build import SensorOnArm
 
-__all__ = ["decode_surfaces", "encode_surfaces"]
-
 _MAX_NODES = 2048  # of a grid, along and around; ``build`` makes 65 x 129
 
 

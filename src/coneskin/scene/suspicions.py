@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from .values.scene import LinkScene, PlacedSensor, Scene
 
-__all__ = ["suspicions"]
-
 _TURN = 2.0 * math.pi  # rad
 _EIGHTH = math.pi / 4.0  # rad; angles that people write in radians are mostly multiples of it
 _CLOSE = 0.003  # of a number, to such a multiple

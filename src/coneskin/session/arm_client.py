@@ -18,8 +18,6 @@ from coneskin.robot.driver.values import Waypoint
 if TYPE_CHECKING:
     from coneskin.robot.driver.protocol import OutputWriter, VariableReader
 
-__all__ = ["ArmClient"]
-
 _MAX_ATTEMPTS = 10  # at one request, where this computer held it up until it was void
 _ANSWER_PERIOD = 0.05  # s between two looks at what else may have ended a wait
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 
     from .skin_client import SkinClient
 
-__all__ = ["ChildProcesses"]
-
 _WATCHDOG_NAMES = ("watchdog", "second watchdog")
 _END_TIMEOUT = 6.0  # s for the guard to stop the arm and end
 

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.diagnosis.capture import CaptureWindow
 
-__all__ = ["EventLog", "discard_recording", "new_recording"]
-
 #: kinds of block without which nothing can be replayed
 _COPIED_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE})
 

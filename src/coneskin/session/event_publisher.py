@@ -17,8 +17,6 @@ from urllib.parse import urlsplit
 from coneskin.core.errors import SceneError
 from coneskin.robot.guard.signals.journal import GuardEvent
 
-__all__ = ["EventPublisher"]
-
 _MAX_DATAGRAM = 8000  # bytes of a datagram; loopback and most networks carry them
 _URL_EXAMPLE = "write udp://127.0.0.1:9870"
 

@@ -19,8 +19,6 @@ from coneskin.robot.guard.signals.journal import EventName
 from .event_log import EventLog
 from .outcome import NOT_CONFIRMED, STANDS, reasons
 
-__all__ = ["GuardMonitor"]
-
 _REPORT_PERIOD = 0.05  # s between two looks for what the watchdogs of a lost guard report
 _ACTIVATION_TIME = 2.0  # s in which a guard mostly becomes active; later it is said what is wrong with the skin's line
 

@@ -13,8 +13,6 @@ from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.core.recording.block import encode_block
 
-__all__ = ["main"]
-
 _NICE_VALUE = -15  # nice value; more would be in the way of the kernel's own threads
 _AUTOGROUP_FILE = Path("/proc/self/autogroup")  # of sched(7): nice values only count among the processes of one session
 

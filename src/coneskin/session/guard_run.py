@@ -25,8 +25,6 @@ from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
 from coneskin.skin.sources.source import SourceReopening
 
-__all__ = ["run_guard"]
-
 _LOCK_TIMEOUT = 3.0  # s for the guard of a program that was killed to stop its arm and end
 _CREDENTIALS = struct.Struct("3i")  # ucred of unix(7): process, user, group
 _LOCK_PERIOD = 0.05  # s

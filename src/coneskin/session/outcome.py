@@ -18,20 +18,6 @@ if TYPE_CHECKING:
 
     from .event_log import EventLog
 
-__all__ = [
-    "NOT_CONFIRMED",
-    "STANDS",
-    "STILL_RETREATING",
-    "activation_error",
-    "await_outcome",
-    "braking_time",
-    "exit_code",
-    "exit_error",
-    "reasons",
-    "stands",
-    "stop_error",
-]
-
 STANDS = "the arm stands"
 STILL_RETREATING = "the arm has stood and still moves away from the touch"
 NOT_CONFIRMED = "standstill of the arm NOT confirmed"

@@ -13,8 +13,6 @@ from coneskin.core.recording.recorder import hold_against_recorder
 from coneskin.core.recording.retention import prune_file
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
 
-__all__ = ["AROUND", "prune_part", "prune_run"]
-
 AROUND = 5.0  #: s before and after an event in which all stays
 _KEPT_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.EVENT, BlockKind.OVERRUN})
 _EVENT_KINDS = frozenset({BlockKind.EVENT})

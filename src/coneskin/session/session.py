@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
     from .ur_rtde_names import UrRtdeArm
 
-__all__ = ["Session", "guard"]
-
 _START_TIMEOUT = 20.0  # s for the children to start and the guard to become active
 _REASON_TIMEOUT = 5.0  # s for the guard to report why the driver process ended
 

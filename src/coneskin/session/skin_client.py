@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["SkinClient"]
-
 _ANSWER_TIMEOUT = 10.0  # s that the process may take to start, or to answer
 
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:  # imported once the line to the program is there, which may h
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
     from coneskin.skin.virtual.skin import VirtualSkin
 
-__all__ = ["main", "virtual_skin"]
-
 _TOUCH_DELAY = 0.002  # s from a request to its touch, so that it begins on a frame that is not measured yet
 
 

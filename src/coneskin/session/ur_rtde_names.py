@@ -24,8 +24,6 @@ if TYPE_CHECKING:  # a file of stubs alone, which scripts/reference.py makes fro
 else:
     UrRtdeMethods = object
 
-__all__ = ["NAMES", "REFUSALS", "UrRtdeArm"]
-
 _SPEED_HOLD_TIME = (
     0.5  # s for which a speed holds at least; a program of ur_rtde may rely on its lasting until speedStop
 )

@@ -10,8 +10,6 @@ from pathlib import Path
 from coneskin.scene.commissioning_record import MIN_MARKS, CommissioningRecord, MarkResult, fingerprint, write_record
 from coneskin.scene.values.scene import Commissioning, Scene
 
-__all__ = ["ESCALATE", "GOAL", "START", "commissioned", "forearm_scene", "start_with", "write_passed_record"]
-
 START = [math.radians(q) for q in (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)]  #: joint positions [rad]
 GOAL = [math.radians(60.0), *START[1:]]  #: joint positions 100 deg of the base further [rad]
 ESCALATE = 0.025  #: s; default of the scene's monitoring.escalate_ms

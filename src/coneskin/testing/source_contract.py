@@ -26,8 +26,6 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, FrameDecoder, encode
 
-__all__ = ["SOURCE_CHECKS", "OpenLine", "OpenLineFactory", "contract_bytes"]
-
 _LINE_TIMEOUT = 10.0  # s; far beyond what a line in one machine needs, so reached only where the contract is broken
 _TOUCHED_SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
 _FRAME_PERIOD = 1e-3  # s

@@ -15,8 +15,6 @@ from time import monotonic
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-__all__ = ["ALLOWED", "UPLOADS", "ConnectionGate"]
-
 #: types of message that a page may send
 ALLOWED = frozenset({"ViewerCameraMessage", "GuiUpdateMessage"})
 #: and those with which a file is dropped onto it

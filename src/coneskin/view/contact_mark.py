@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 from coneskin.geometry.pose import Vector
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
-__all__ = ["FADING", "ContactLog", "ContactMark"]
-
 FADING = 4.0  #: s that the mark of a touch that is over is still seen
 _MAX_TOUCHES = 400  # touches that are remembered, in a page that stays open
 _PLACE_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from .stage.sheet_surface import SheetSurface
     from .stage.stage import Stage
 
-__all__ = ["FieldChoice"]
-
 _FIELD_OFF = "off"
 _FLAT_SPAN = 1e-3  # of the supply: what differs by less than this is drawn in one colour
 

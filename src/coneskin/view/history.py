@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from coneskin.robot.driver.values import ControllerState
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["CHANNELS", "PHASE_COLOURS", "UNKNOWN", "History", "PhaseWords", "Series"]
-
 #: kind of a phase -> its colour, which differ in brightness by 3 and more, so that no eye mistakes the last three
 PHASE_COLOURS = {"unknown": "#6b7280", "active": "#1d7dc9", "moving": "#fff3b8", "stopped": "#4a0d18"}
 

@@ -24,8 +24,6 @@ from .stage.sheet_surface import SheetSurface
 from .stage_nodes import StageNodes, look_at_stages
 from .traces import trace_drawings
 
-__all__ = ["write_html"]
-
 _LEVEL_STEPS = 100  # of a level, which a bar can show
 
 

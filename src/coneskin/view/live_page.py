@@ -21,8 +21,6 @@ from .stage.stage import Stage
 from .stage_nodes import StageNodes, look_at_stages
 from .traces import trace_drawings
 
-__all__ = ["LivePage"]
-
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _POLL_PERIOD = 0.008  # s between two looks at the recording
 _TEXT_PERIOD = 0.2  # s between two changes of the text: a processor that draws the arm draws it too

@@ -18,8 +18,6 @@ from .history import History
 from .run_course import RunCourse
 from .stage.stage import set_stage
 
-__all__ = ["KEPT", "LiveRun", "find_live_run", "is_live"]
-
 KEPT = 60.0  #: s of a live run that its page keeps
 _GROWING_TIME = 3.0  # s since the last write, within which a recording grows: a guard records ticks all the time
 _KINDS_KEPT = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.EVENT})

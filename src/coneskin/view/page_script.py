@@ -6,8 +6,6 @@ and the server's differ by what the quickest message took, which may drift by as
 
 from __future__ import annotations
 
-__all__ = ["PANEL_HEAD"]
-
 _PANEL_STYLE = """
 #coneskin-notice{border:1px solid #b45309;background:#fef3c7;color:#78350f;padding:6px 8px;font-size:12px}
 #coneskin-notice,.coneskin-phase,.coneskin-card,.coneskin-title,#coneskin-stale,#coneskin-clock,#coneskin-levels,

@@ -17,8 +17,6 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
 from .page_script import PANEL_HEAD
 
-__all__ = ["LOOPBACK", "PageServer", "page_client"]
-
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 _MAX_UPLOAD_SIZE = 200_000_000  # bytes of a message, where files may be dropped
 _FIELD_OF_VIEW = math.radians(50.0)  # from top to bottom; viser's own 75 deg makes what is far small

@@ -14,8 +14,6 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe
 from .history import PHASE_COLOURS, PhaseWords
 from .run_course import RunCourse
 
-__all__ = ["NOTICE", "PAGE_LEGEND", "event_list", "state_of", "status", "stop_entries", "timeline"]
-
 NOTICE = (
     '<div id="coneskin-notice">No safety display. What is drawn may be late, old or wrong; '
     "nobody may rely on it near an arm.</div>"

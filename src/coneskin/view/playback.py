@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import math
 
-__all__ = ["DELAY", "SPEEDS", "Playback", "Playout"]
-
 SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  #: times the recorded speed
 
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from .contact_mark import ContactMark
     from .history import PhaseWords
 
-__all__ = ["Moment", "RunCourse", "event_lines", "read_courses"]
-
 
 @dataclass(frozen=True, slots=True)
 class Moment:

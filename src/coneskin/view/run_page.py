@@ -21,8 +21,6 @@ from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
 from .traces import trace_drawings
 
-__all__ = ["show_runs"]
-
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
 _SPEED_CHOICES = {f"{speed:g}x": speed for speed in SPEEDS}

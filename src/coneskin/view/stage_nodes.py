@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from .stage.solids import Solid
     from .stage.stage import Stage
 
-__all__ = ["LOCATED", "StageNodes", "light_plainly", "look_at_stages"]
-
 _MARKS_PER_LINK = 6  # nodes for contacts on each link with a sheet, used again and again
 LOCATED = (214, 70, 224)  #: colour of a mark whose place is certain
 _UNCERTAIN, _PAST = (249, 115, 22), (150, 143, 138)

@@ -14,8 +14,6 @@ from .run_course import RunCourse
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
 
-__all__ = ["trace_drawings"]
-
 _BIN_COUNT = 240  # each with its least and its largest value
 _LEVELS, _SPEEDS, _FORCE = "touch level", "joint speed [rad/s]", "contact force [N]"
 _Line = tuple[str, Series, int, float]  # name, values, which of them, and the host time that is 0 [s]

@@ -5,8 +5,6 @@ An example is a program whose last line must be True. Many are those of "The URS
 
 from __future__ import annotations
 
-__all__ = ["EXAMPLES", "NO_EFFECT"]
-
 _Q = "[0.1, -1.4, 1.5, -1.7, -1.4, 0.2]"
 _LEVEL = "get_actual_tcp_pose()"
 

@@ -30,8 +30,6 @@ from coneskin.skin.detection.stream import TouchStream
 from .explorer import Exploration, explore
 from .guard_world import PROGRESS, GuardWorld, Settings
 
-__all__ = ["BREAKS", "Break", "broken", "find"]
-
 _ALWAYS = ("wait", "wait for a change", "a program moves", "unlock")
 _SETTINGS, _TWO = Settings(), Settings(most_wrong=2)
 _MOTION = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)

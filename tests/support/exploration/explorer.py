@@ -13,8 +13,6 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, Self
 
-__all__ = ["Exploration", "World", "explore"]
-
 
 class World(Protocol):
     """What an explorer needs of a world."""

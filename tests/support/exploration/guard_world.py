@@ -40,8 +40,6 @@ from coneskin.skin.wire import Frame, encode
 
 from .snapshot import clone
 
-__all__ = ["CONTROLS", "INVARIANTS", "PROGRESS", "REACTIONS", "GuardWorld", "Settings"]
-
 REACTIONS = {
     "stop": 'kind = "stop"',
     "slow": 'kind = "slow"\ntime_budget_s = 1\npress_mm = 50',

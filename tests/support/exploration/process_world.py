@@ -14,8 +14,6 @@ from dataclasses import dataclass, replace
 from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, UNGUARDED_TIME
 from coneskin.robot.stop.limits import MonitoringLimits
 
-__all__ = ["PROCESS_INVARIANTS", "Parts", "ProcessWorld"]
-
 _TICK = 0.05  # s; no limit is finer
 _MOST_WRONG = 2  # processes or lines at once, beside lost beats
 _MOST_LOST = 2  # beats of one line in a row that may be lost while nobody needs to stop

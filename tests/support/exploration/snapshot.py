@@ -10,8 +10,6 @@ from dataclasses import is_dataclass
 from functools import partial
 from typing import Any
 
-__all__ = ["clone"]
-
 _SHARED: dict[type, bool] = {}
 _ATTRIBUTES: dict[type, tuple[str, ...] | None] = {}
 _PLAIN = (int, float, complex, bool, str, bytes, type(None), type, range, re.Pattern, frozenset)

@@ -20,8 +20,6 @@ from coneskin.skin.field.green import Strip
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 
-__all__ = ["Robin", "area_error", "effective_area"]
-
 
 class Robin:
     """Gradient of the Robin function of a sheet, in the rectangle (x, y), without the stretch.

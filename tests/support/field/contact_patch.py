@@ -29,8 +29,6 @@ from coneskin.skin.field.green import Strip, StripPoints, direct_features, kerne
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 
-__all__ = ["ContactPatch", "Outline", "disc", "ellipse", "rectangle", "rectangle_offsets", "solve_patch"]
-
 #: Distance of the outline [m] in each direction [rad].
 Outline = Callable[[Floats], Floats]
 

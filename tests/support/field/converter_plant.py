@@ -11,8 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["ConverterPlant", "leak_admittance"]
-
 Array = NDArray[np.float64]
 _SWITCH = 1e-3  # ohm; between a terminal and the rail that it is switched to
 _PHASES = ("bb..", "gb..", "..bg")  # of A, B, C, D: b to the supply, g to ground, a dot to what is read

@@ -9,8 +9,6 @@ import mpmath as mp
 from coneskin.skin.field.fourport import Coupling, DrivePhase
 from coneskin.skin.field.model import FieldModel
 
-__all__ = ["exact_volts"]
-
 
 def exact_volts(coupling: Coupling, model: FieldModel, phase: DrivePhase) -> list[mp.mpf]:
     """Return the potentials of A, B, C, D [V]; unknown are four potentials, four currents and the contact's voltage."""

@@ -12,8 +12,6 @@ import mpmath as mp
 from coneskin.skin.field.circles import PHASE
 from coneskin.skin.field.sheet import SectorSheet
 
-__all__ = ["ExactSolution", "solve_exactly"]
-
 DIGITS = 60
 
 

@@ -25,8 +25,6 @@ from coneskin.skin.field.sheet import SectorSheet
 
 from . import exact_solution
 
-__all__ = ["ORDER", "POINTS", "ExtremeCase", "RoundingErrors", "extreme_cases", "measure", "scale_errors"]
-
 ORDER = 3  # highest multipole, here and in the exact solution
 POINTS = 8  # on the rim of the disc, likewise
 

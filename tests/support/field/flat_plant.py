@@ -17,8 +17,6 @@ import numpy as np
 from . import ngsolve_peer
 from .problems import Array, EllipticPatch, Problem
 
-__all__ = ["FlatPlant", "PressedPatch"]
-
 _HP_LAYERS = 2  # of small triangles where an edge cuts a rim
 
 

@@ -17,8 +17,6 @@ import numpy as np
 from .port_solution import PeerSolution
 from .problems import Array, CircularPatch, Problem
 
-__all__ = ["LIMITS", "NAME", "make_mesh", "solve"]
-
 NAME = "NGSolve"
 LIMITS = (
     "every new place of contact needs a new mesh; no sheet electrode model of its own (three Dirichlet solves here)"

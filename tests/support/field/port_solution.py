@@ -9,8 +9,6 @@ import numpy as np
 
 from .problems import Array
 
-__all__ = ["PeerSolution", "PortSolution", "port_solution"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PortSolution:

@@ -30,18 +30,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "ELECTRODES",
-    "Array",
-    "CircularPatch",
-    "EllipticPatch",
-    "Problem",
-    "general_problems",
-    "hard_problems",
-    "random_problems",
-    "standard_problems",
-]
-
 Array = NDArray[np.float64]
 
 #: Order of the electrodes in every vector and matrix.

@@ -18,8 +18,6 @@ from .port_solution import PeerSolution
 from .problems import Problem
 from .skfem_peer import FlatMesh, make_mesh
 
-__all__ = ["LIMITS", "NAME", "make_mesh", "solve"]
-
 NAME = "pyEIT"
 LIMITS = "degree 1 with straight edges only; no complete electrode model: electrodes by merging nodes; Python loops"
 

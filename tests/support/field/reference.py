@@ -13,8 +13,6 @@ import numpy as np
 from .port_solution import PortSolution, port_solution
 from .problems import Array, CircularPatch, EllipticPatch, Problem
 
-__all__ = ["PATH", "Reference", "encode_reference", "load_references", "provenance"]
-
 PATH = Path(__file__).with_name("reference.json")
 
 

@@ -20,8 +20,6 @@ from scipy import special
 from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.sheet import SectorSheet
 
-__all__ = ["guide_volts", "solve_rims"]
-
 Floats = NDArray[np.float64]
 
 _OCTAVE = 4.0  # ratio of the scales at which points crowd

@@ -16,8 +16,6 @@ import numpy as np
 from .port_solution import PeerSolution
 from .problems import Array, Problem
 
-__all__ = ["LIMITS", "NAME", "FlatMesh", "make_mesh", "solve"]
-
 NAME = "scikit-fem"
 LIMITS = "no mesh generator, triangles up to degree 4, no static condensation, no sheet electrode of its own"
 

@@ -13,8 +13,6 @@ from .contact_patch import ContactPatch, solve_patch
 from .port_solution import PortSolution
 from .problems import Array, CircularPatch, Problem
 
-__all__ = ["contact_patch", "disc_arrays", "field_model", "solve_discs", "solve_general"]
-
 
 def field_model(problem: Problem, tolerance: float = 1e-12) -> FieldModel:
     """Return the sensor of a problem without contacts: a negative curvature where end 2 is the narrow one."""

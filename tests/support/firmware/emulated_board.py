@@ -19,8 +19,6 @@ from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-__all__ = ["BoardPrograms", "BoardRun", "Conversion", "EmulatedBoard", "run_board", "sheets_at_touch"]
-
 _STEP = 1e-3  # s; between two states of the sheets while a touch changes
 
 

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from coneskin.skin.firmware.boards import firmware_folder
 
-__all__ = ["PACKAGES", "build_emulator", "build_sketch", "missing_tools"]
-
 #: what must be installed, on Debian and its kin
 PACKAGES = "gcc libc6-dev gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev"
 _CORE = Path("/usr/share/arduino/hardware/arduino/avr")

@@ -6,8 +6,6 @@ from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.testing.scenes import commissioned, forearm_scene
 
-__all__ = ["board_scene"]
-
 # what the board's page says of an Uno: its bits, the resistance of its pins and switches, its rate on the line
 _SENSOR = "adc_bits = 11\nlead_ohm = [26, 3, 3, 26]"
 _BAUD = 500_000

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
     from coneskin.scene.values.scene import ArmScene
 
-__all__ = ["Commissioner", "commission_virtual_skin", "prepare"]
-
 _START_TIMEOUT = 3.0  # s for the first state
 _STATE_TIMEOUT = 1.0  # s without a state
 _MAX_MOTION = 0.02  # rad; the words for the marks are of one posture

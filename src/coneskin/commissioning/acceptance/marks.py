@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["MIN_POWER", "offer_marks", "place_sensors", "plan_marks"]
-
 MIN_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
 _MAX_MARKS = 9
 _SLANT_PARTS = (0.2, 0.5, 0.8)  # parts of the slant at which there are marks

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from .procedure import Procedure, SensorMarks
 
-__all__ = ["draw_marks"]
-
 _MARK_COLOR = "#c0392b"
 _CURVE_POINTS = 61  # of a curve
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["Procedure", "SensorMarks"]
-
 _HOLD_TIME = 0.3  # s for which a touch must rest at a certain place
 _REST_RADIUS = 0.008  # m; a place that moves farther does not rest
 _OTHER_TIME = 0.4  # s of a touch elsewhere, after which it counts

@@ -27,8 +27,6 @@ from .touches import SensorTouches, TouchSequence
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["MARK_COUNTS", "CalibrationResult", "Calibrator", "calibration_marks"]
-
 MARK_COUNTS = (4, 9, 16)  #: marks that there may be: 2, 3 or 4 along, and as many around
 
 

@@ -28,15 +28,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = [
-    "MIN_TOUCHES",
-    "CalibrationFit",
-    "Errors",
-    "KnownTouch",
-    "agreeing",
-    "fit_map",
-]
-
 MIN_TOUCHES = 4  #: at different places
 _MIN_EXTENT = 0.3  # of the sheet, between the outermost of them
 

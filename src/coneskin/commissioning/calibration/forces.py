@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["ForceSequence", "SensorPresses", "fit_forces"]
-
 _MIN_RISE = 2.0  # standard errors by which the next force must raise the level
 _MODEL_ERROR = 0.02  # of the force; no interpolation is better
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from .calibrate import CalibrationResult
     from .fit import KnownTouch
 
-__all__ = ["draw_residuals"]
-
 _BEFORE_COLOR, _AFTER_COLOR = "#888888", "#c0392b"
 _ARROW_PART = 0.12  # of the slant, of the longest arrow
 _ARROW_SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500)

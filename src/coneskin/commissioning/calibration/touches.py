@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["SensorTouches", "TouchSequence"]
-
 _HOLD_TIME = 0.3  # s for which a touch must rest at a certain place
 _MEAN_TIME = 1.0  # s of readings, at most, that make a mean
 _REST_RANGE = 0.004  # m; a place that moves farther does not rest

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     from .skin_examination import SensorStatistics
 
-__all__ = ["Doctor", "diff_texts", "set_sensor_keys"]
-
 _LISTEN_TIME = 2.0  # s of an untouched skin
 _READ_TIMEOUT = 0.05  # s
 _START_TIME = 1.0  # s for the first bytes, after which the port counts as silent

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.sources.source import Source
 
-__all__ = ["examine_touches", "guided_touches"]
-
 _HOLD_TIME = 0.3  # s that a touch, or an untouched sensor, must rest
 _TOUCH_CHANGE = 0.04  # of the supply or the full scale, by which a touch moves a reading
 _REST_RANGE = 0.03  # likewise, by which a touch that rests may move

@@ -16,8 +16,6 @@ from coneskin.core.child_process import shorten_time_slice
 from coneskin.core.finding import Finding, Verdict
 from coneskin.core.process_watch import load
 
-__all__ = ["begin_measurement", "examine_hold_ups"]
-
 _WAKE_PERIOD = 0.002  # s; a guard wakes as often
 _LONG_TIME = 0.02  # s; a guard that was held up for longer reports it
 _MAX_TIME = 0.05  # s; what a scene allows a skin or a controller by default

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["SensorStatistics", "SkinStatistics", "examine_line", "examine_sensor"]
-
 _CHANNELS = (
     *("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "radial_current"),
     *("angular_a", "angular_b", "angular_current", "touch_supply"),

@@ -25,17 +25,6 @@ from coneskin.skin.virtual.ladder import RIGHT_WIRES, ResistorLadder, reorder, w
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = [
-    "READING_NAMES",
-    "WIRINGS",
-    "TouchReadings",
-    "WirePatch",
-    "Wiring",
-    "examine_wires",
-    "touch_places",
-    "touch_words",
-]
-
 #: electrodes on the terminals A, B, C, D, as in "BACD"; the right order first
 _ORDERS = tuple("".join(order) for order in permutations(RIGHT_WIRES))
 _ORDER_INDICES = {wires: wire_order(wires) for wires in _ORDERS}

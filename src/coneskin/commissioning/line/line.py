@@ -13,8 +13,6 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.kinds import open_source
 from coneskin.skin.sources.source import Source
 
-__all__ = ["Line", "find_line"]
-
 _MAX_SIZE = 1 << 28  # bytes of a file of bytes
 _PIECE_SIZE = 4096  # bytes of a file that are taken at once
 

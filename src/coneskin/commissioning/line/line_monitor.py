@@ -18,8 +18,6 @@ from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, FrameDecoder, Status, encode
 
-__all__ = ["LineMonitor", "LineReport", "describe_line", "describe_report", "draw_screen", "draw_sheet"]
-
 _TOUCH_LEVEL = 0.10  # level; that of a sensor about which nothing else is known
 _NEWEST_SIZE = 64  # bytes that are shown where there is no frame
 _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)

@@ -8,8 +8,6 @@ from pathlib import Path
 
 from coneskin.skin.sources.serial_port import PortFacts
 
-__all__ = ["PortSearch", "port_trouble", "stable_name"]
-
 _BY_ID = Path("/dev/serial/by-id")
 
 

@@ -15,21 +15,6 @@ from typing import NamedTuple, TypeGuard
 
 from coneskin.core.errors import RecordingError
 
-__all__ = [
-    "ALL_KINDS",
-    "COPY",
-    "DROPPED",
-    "END",
-    "FILE_KINDS",
-    "MAX_PAYLOAD",
-    "Block",
-    "decode_blocks",
-    "decode_copy",
-    "encode_block",
-    "encode_copy",
-    "is_time",
-]
-
 END = 0  #: kind of the last block of a recording that was closed
 COPY = 255  #: kind: a block that stands elsewhere as well: u8 its kind, f64 its time, its payload
 DROPPED = 254  #: kind: JSON: what retention has dropped

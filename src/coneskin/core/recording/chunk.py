@@ -11,22 +11,6 @@ from coneskin.core.errors import RecordingError
 
 from .block import MAX_PAYLOAD, Block, decode_blocks, encode_block, is_time
 
-__all__ = [
-    "CHUNK_HEAD_SIZE",
-    "FILE_HEAD_SIZE",
-    "LAST_BIT",
-    "MAGIC",
-    "MAX_BODY",
-    "SYNC",
-    "ChunkHead",
-    "bits",
-    "decode_body",
-    "decode_chunk_head",
-    "decode_file_head",
-    "encode_chunk",
-    "encode_file_head",
-]
-
 MAGIC = b"CONESKIN"  #: of a file
 SYNC = b"\xa7CSK"  #: of a chunk
 _FILE_HEAD = struct.Struct("<8sIQI")

@@ -21,8 +21,6 @@ from coneskin.core.text import read_json
 from .block import DROPPED, END, Block, is_time
 from .scan import Damage, Extent
 
-__all__ = ["Defect", "DefectKind", "decode_drop", "encode_drop", "find_defects"]
-
 
 class DefectKind(StrEnum):
     """Kinds of defect."""

@@ -19,8 +19,6 @@ from .chunk import FILE_HEAD_SIZE, LAST_BIT, MAGIC, bits, decode_body, decode_fi
 from .defects import Defect, decode_drop, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, walk
 
-__all__ = ["MAX_SIZE", "Recording", "parts_of", "read_recording"]
-
 MAX_SIZE = 1 << 36  #: bytes of a file: two years of one sensor and an arm; it is never held in memory
 
 

@@ -20,8 +20,6 @@ from coneskin.core.files import open_file
 from .block import END, Block, encode_copy
 from .chunk import encode_chunk, encode_file_head
 
-__all__ = ["FLUSH_PERIOD", "Recorder", "hold_against_recorder", "part_path"]
-
 if sys.platform != "win32":
     import fcntl
 

@@ -17,8 +17,6 @@ from .defects import Defect, DefectKind, encode_drop
 from .reader import MAX_SIZE
 from .scan import Chunk, walk
 
-__all__ = ["prune_file"]
-
 _MAX_KEPT_SIZE = 1 << 16  # bytes of blocks that are kept in one chunk in the place of several
 _MAX_SPAN = 1 << 16  # chunks in whose place one stands
 

@@ -10,8 +10,6 @@ from typing import BinaryIO, NamedTuple
 
 from .chunk import CHUNK_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, decode_chunk_head
 
-__all__ = ["Chunk", "Damage", "Extent", "holds_chunk", "walk"]
-
 _SEARCH_WINDOW = 1 << 18  # bytes that are searched at once
 _SEARCH_LENGTH = MAX_BODY + CHUNK_HEAD_SIZE + _SEARCH_WINDOW  # bytes within which one of the first two chunks begins
 _EXTENT_SIZE = 1 << 22  # bytes of an extent: what a seek has to pass over

@@ -17,8 +17,6 @@ from .reader import MAX_SIZE
 from .recorder import part_path
 from .scan import Chunk, walk
 
-__all__ = ["RecordingTail"]
-
 
 class RecordingTail:
     """Reader of a recording that grows.

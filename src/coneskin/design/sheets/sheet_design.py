@@ -33,15 +33,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
 
-__all__ = [
-    "DesignOptions",
-    "JigPlan",
-    "JigSurface",
-    "SheetDesign",
-    "cover_seams",
-    "design_sheets",
-]
-
 JigSurface = Literal["link", "cone", "none"]
 _MIN_GRIP = 4e-3  # m
 

@@ -19,17 +19,6 @@ from coneskin.skin.electronics import shunt_ohms
 
 from .sheet_design import SheetDesign
 
-__all__ = [
-    "LEAST_ACTIVE_SHARE",
-    "design_summary",
-    "material_rows",
-    "polar_text",
-    "sector_text",
-    "sensor_toml",
-    "sheet_folder",
-    "small_active_area",
-]
-
 
 def design_summary(design: SheetDesign) -> dict[str, Any]:
     """Return the figures of one sheet as plain data; lengths in mm, angles in degrees, None for infinite."""

@@ -24,16 +24,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.ray_casting import RayCaster
 
-__all__ = [
-    "ELECTRODE_COLOURS",
-    "design_facts",
-    "deviation_bands",
-    "electrode_marks",
-    "flat_drawing",
-    "legend",
-    "warning_list",
-]
-
 #: of a deviation, from the mesh far below the side, over on it, to far above
 _BAND_COLOURS = (
     (33, 102, 172),

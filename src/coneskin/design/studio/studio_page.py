@@ -39,8 +39,6 @@ if TYPE_CHECKING:
 
     from coneskin.design.sheets.sheet_design import SheetDesign
 
-__all__ = ["FILE_DROP", "StudioPage"]
-
 #: for the head of the page: a file that is dropped anywhere goes the way of viser's button, which takes one from its
 #: dialogue alone; a browser would leave the page otherwise, and show the file
 FILE_DROP = """<script>

@@ -15,8 +15,6 @@ from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-__all__ = ["Handles", "Workbench"]
-
 _MIN_LENGTH = 0.010  # m; a sheet cannot be shorter than this
 _TIGHT_SHARE = 0.9  # of the tolerance, from which on a deviation is worth a warning
 _BRIDGED_SHARE = 0.05  # share of a sheet over holes, from which on it is worth a warning

@@ -12,8 +12,6 @@ from coneskin.geometry.drawing.nesting import MaterialBed
 
 from .build_figures import BuildFigures
 
-__all__ = ["ADHESIVE", "bill_of_materials"]
-
 ADHESIVE = 50e-6  # m; thickness of the tape between the layers
 _STRIP_WIDTH = 3e-3  # m; width of the tape in the margins of the isolation
 _OFFCUT_FACTOR = 1.15  # of the area of tape; it is trimmed at the borders

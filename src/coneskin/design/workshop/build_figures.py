@@ -28,23 +28,6 @@ from .placement import DatumFace, SheetPlacement, find_placement
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
 
-__all__ = [
-    "ROLLING",
-    "SETTING",
-    "SPREAD",
-    "TAPE",
-    "WIRE_COLOURS",
-    "BuildFigures",
-    "CableExit",
-    "in_mm",
-    "in_ohms",
-    "measure_build",
-    "section_head",
-    "side_name",
-    "table_head",
-    "tie_place",
-]
-
 #: wire that lies on the tab, stripped; in the connector's contact; and the loop behind the strain relief [m]
 STRIPPED, IN_CONTACT, LOOP = 8e-3, 4e-3, 20e-3
 _ROUND_TO = 5e-3  # m; wires are cut to multiples of it

@@ -31,8 +31,6 @@ from .build_figures import (
 )
 from .placement_text import placement_lines
 
-__all__ = ["guide_lines"]
-
 
 def _flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps that are done while everything is flat."""

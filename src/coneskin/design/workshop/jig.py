@@ -25,8 +25,6 @@ from coneskin.geometry.solid import ClosedSurface, shell_surface, widest_nearby,
 
 from .link_excess import LinkExcess
 
-__all__ = ["Collar", "jig_collars"]
-
 Floats = NDArray[np.float64]
 
 _BORDER_COLUMN = math.radians(2.0)  # step around the axis

@@ -18,8 +18,6 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
-__all__ = ["LinkExcess"]
-
 Floats = NDArray[np.float64]
 
 _EDGE_STEP = 0.4e-3  # m; between the points at which an edge is looked at

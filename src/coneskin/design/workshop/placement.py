@@ -19,15 +19,6 @@ from coneskin.geometry.ray_casting import RayCaster
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
 
-__all__ = [
-    "DatumFace",
-    "LinkFeature",
-    "SheetPlacement",
-    "find_datum_faces",
-    "find_placement",
-    "sharpest_bends",
-]
-
 Floats = NDArray[np.float64]
 
 _FLAT_DISTANCE = 0.2e-3  # m; corners so near to a plane lie in it

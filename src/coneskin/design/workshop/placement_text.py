@@ -12,8 +12,6 @@ from coneskin.design.sheets.sheet_design import SheetDesign
 from .build_figures import BuildFigures, in_mm, table_head
 from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
-__all__ = ["placement_lines"]
-
 _AT_END = 3e-3  # m; a sheet so near to the end of a link is placed by eye
 _MAX_RULER = 0.2  # m; a ruler through the air
 

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["ALONG", "AROUND", "ArmPatch", "motion_positions", "patches_of", "weigh"]
-
 ALONG = 3  #: patches along a sheet: its two ends, and the middle
 AROUND = 16  #: around a whole turn
 _SAMPLE_COUNT = 200  # joint positions of a motion that are looked at

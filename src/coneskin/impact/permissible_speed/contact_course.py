@@ -10,8 +10,6 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-__all__ = ["ContactCourse", "ContactState", "Stretch", "evaluate", "first_fall", "greatest"]
-
 
 @dataclass(frozen=True, slots=True)
 class ContactState:

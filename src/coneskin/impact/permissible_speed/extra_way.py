@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = ["ExtraWay", "extra_ways"]
-
 #: m; radius of what is struck. The flatter it is, the sooner a link that tilts has pressed it
 BODY_RADIUS = 0.1
 _MAX_EXTRA_WAY = 2.0  # rad of the leading joint; the mean lever of any way is at most that of this one

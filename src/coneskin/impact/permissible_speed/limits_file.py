@@ -22,8 +22,6 @@ from coneskin.scene.tables.keys import MAX_SIZE
 
 from .two_mass_contact import StruckBody
 
-__all__ = ["BodyRegion", "ForceLimits", "LimitsFile", "MeasuredReaction", "read_limits"]
-
 _LIMIT_KEYS = (Key("edition", str), Key("transcribed_by", str), Key("verified_by", str), Key("region", dict))
 _MEASURED_KEYS = (
     Key("reaction_ms", low=0.0, high=1000.0),

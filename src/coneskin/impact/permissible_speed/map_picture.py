@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from .limits_file import LimitsFile
 
-__all__ = ["draw_map"]
-
 _LEVER_INDEX = 4  # of LEVERS: 0.32 m/rad, about that of a forearm
 _MAX_SHEETS = 6  # sheets that are drawn
 

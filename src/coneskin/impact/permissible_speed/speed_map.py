@@ -39,16 +39,6 @@ if TYPE_CHECKING:
 
     from .arm_patches import ArmPatch
 
-__all__ = [
-    "LEVERS",
-    "SpeedMap",
-    "contact_at",
-    "map_speeds",
-    "map_table",
-    "permissible_speed",
-    "write_map",
-]
-
 #: m/s; no faster speed is looked at
 _TOP_SPEED = 5.0
 #: m/s; below, no speed counts as permissible

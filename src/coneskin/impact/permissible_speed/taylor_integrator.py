@@ -30,8 +30,6 @@ from .two_mass_contact import TwoMassContact
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-__all__ = ["HORIZON", "POINTS", "expand", "integrate", "reach"]
-
 _SERIES_ORDER = 18
 _SERIES_SHARE = 0.1  # of the tolerance, for the last coefficients of a step over the largest
 

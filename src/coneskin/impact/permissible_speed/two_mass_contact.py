@@ -21,8 +21,6 @@ from dataclasses import dataclass, field
 from coneskin.core.errors import SensorError
 from coneskin.skin.materials import Padding
 
-__all__ = ["DrivenArm", "StruckBody", "TwoMassContact"]
-
 #: N; closes the layers of the sensor, "A Flexible Annular Sectorial Sensor ...", section 4.2
 _CLOSING_FORCE = 0.5
 

@@ -39,8 +39,6 @@ from .mujoco_plant import MujocoPlant
 from .scene_description import SheetOnLink
 from .scene_plant import currents_of, presses_of, sheets_of
 
-__all__ = ["PROTECTIONS", "CollisionRun", "follow_waypoints"]
-
 _MAX_FORCE = 150.0  # N, at which the imitated limit stops the arm
 _FILTER_TIME = 0.01  # s
 _ELBOW_LINK = 2  # index of the link at whose far end it is

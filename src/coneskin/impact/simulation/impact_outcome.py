@@ -18,8 +18,6 @@ from coneskin.robot.guard.signals.journal import BlockKind, force_block
 from coneskin.skin.virtual.imperfections import ContactLaw
 from coneskin.skin.virtual.skin import Press
 
-__all__ = ["CLAMP_TIME", "ImpactMeter", "ImpactOutcome", "TouchRecorder", "TruthRecorder"]
-
 _REPEAT_PERIOD = 10.0  # s after which what was told is told again, for who looks on from later
 _MIN_BODY_MOTION = 1e-4  # m by which a body that nothing touches must have moved
 

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["LivePlant"]
-
 _START_TIMEOUT, _ANSWER_TIMEOUT = 30.0, 5.0  # s
 
 

@@ -24,8 +24,6 @@ from coneskin.skin.materials import Padding
 
 from .scene_description import SheetOnLink, body_link, describe_scene
 
-__all__ = ["STEP", "MujocoPlant", "Touch"]
-
 _FORCE_BAND = (
     100.0  # N between the force wanted and felt at which a person moves at full speed; faster, hands would hammer
 )

@@ -24,8 +24,6 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 if TYPE_CHECKING:
     from .impact_outcome import ImpactMeter
 
-__all__ = ["main"]
-
 _POLL_TIMEOUT = 1.0  # s between two looks at whether anybody is left
 _TRUTH_PERIOD = 0.01  # s from one recorded force to the next
 _PROCESS_NICENESS = -10  # niceness; behind the guard

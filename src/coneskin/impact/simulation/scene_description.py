@@ -21,8 +21,6 @@ from coneskin.robot.arm.kinematics import JOINTS, cos_sin
 from coneskin.robot.arm.model import ArmModel
 from coneskin.scene.values.scene import BodyScene
 
-__all__ = ["SheetOnLink", "body_link", "describe_scene", "numbers"]
-
 SERVO_FREQUENCY = 15.0  #: Hz; of the position loop of a joint, critically damped; assumed, UR publishes none
 
 

@@ -17,8 +17,6 @@ from coneskin.skin.virtual.skin import Press
 from .mujoco_plant import MujocoPlant
 from .scene_description import SheetOnLink
 
-__all__ = ["ScenePlant", "currents_of", "presses_of", "sheets_of"]
-
 _CONTACT_PERIOD = 5  # steps of the integration from one look at the contacts to the next, in real time
 
 

@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 
     from coneskin.runs.replay.run import Run
 
-__all__ = [
-    "FORMATS",
-    "export_run",
-]
-
 
 def _write_npz(path: Path, tables: Mapping[str, Pieces]) -> int:
     """Write each column as an array "table.column" and return the number of rows of all tables.

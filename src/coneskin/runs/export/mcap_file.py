@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["write_mcap"]
-
 _STATE_WINDOW = 1.0  # s between a contact and the state of the arm in which it is drawn
 _DRAWN_EVERY = 0.02  # s between two drawings of the arm
 _FRAME_ID = "base"

@@ -9,8 +9,6 @@ from coneskin.core.errors import MissingExtra, RecordingError
 
 from .tables import Table
 
-__all__ = ["write_parquet"]
-
 
 def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
     """Write a table, in pieces with the same columns, as a Parquet file, and return the number of its rows.

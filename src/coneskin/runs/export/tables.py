@@ -21,13 +21,6 @@ from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame
 if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
 
-__all__ = [
-    "Pieces",
-    "Table",
-    "table_pieces",
-    "wall_clock",
-]
-
 #: column -> its values, one for each row: all of one type, or None where there is none
 Table = Mapping[str, list[Any]]
 #: begins a table anew and yields its pieces, each with the same columns; nothing where it has no rows

@@ -15,8 +15,6 @@ from coneskin.core.errors import RecordingError
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import GuardEvent
 
-__all__ = ["EXACT", "QUANTITIES", "Tolerances", "describe_differences", "distance", "event_differences", "milliseconds"]
-
 _RAD_PER_DEG = math.pi / 180.0  # rad
 
 

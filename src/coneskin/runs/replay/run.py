@@ -43,9 +43,6 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["MOST_DIFFERENCES", "Replay", "Run", "Verdict", "read_header", "read_run"]
-
-
 MOST_DIFFERENCES = 5  #: that a replay describes
 
 

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from coneskin.scene.build import SensorOnArm
 
-__all__ = ["draw_run"]
-
 _EVENT_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
 _MAX_GAP = 0.05  # s between two states, from which on nothing is drawn between them: nobody has measured it
 _MIN_SPACING = 0.08  # of the width; marks that are closer share a label

@@ -16,8 +16,6 @@ from coneskin.core.progress import Progress, silent
 
 from .what_if import broken_rows, judge_run
 
-__all__ = ["judge_runs"]
-
 _CONNECT_TIMEOUT = 5.0  # s
 
 

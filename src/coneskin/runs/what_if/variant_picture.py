@@ -15,8 +15,6 @@ from .variant_table import VariantScore, duration_words, shared_settings
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_variants"]
-
 _LINE_HEIGHT = 0.19  # inch of a line of the key
 _MIN_DELAY_SCALE = 1.0  # ms that the scale of the delays shows at least, above the largest
 

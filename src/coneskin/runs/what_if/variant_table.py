@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 
 from coneskin.runs.export.parquet_file import write_parquet
 
-__all__ = ["VariantScore", "duration_words", "score_variants", "shared_settings", "variant_lines", "write_rows"]
-
 
 class VariantScore(NamedTuple):
     """Score of one variant over all runs.

@@ -29,13 +29,6 @@ from coneskin.runs.run_files import run_name
 if TYPE_CHECKING:
     from coneskin.runs.replay.run import Run
 
-__all__ = [
-    "AS_RECORDED",
-    "broken_rows",
-    "judge_run",
-    "what_if",
-]
-
 _MAX_SIZE = 1 << 24  # bytes
 _TRUTH_KINDS = frozenset({BlockKind.TRUTH})
 _TRUTH_FIELDS = {"touches", "pressed", "released"}  # of what touched the skin

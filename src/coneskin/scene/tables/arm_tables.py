@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.materials import Padding
 
-__all__ = ["read_arm", "read_bodies", "read_monitoring", "read_motion", "read_padding", "read_reaction"]
-
 _WAYPOINT_KEYS = (replace(k.MOTION_KEYS[0], name="q_deg"),)
 _RULE_CONDITIONS = ("link", "level_above", "speed_above")  # of a rule
 #: keys that a kind must have, because nothing is known that holds for all

@@ -22,27 +22,6 @@ from coneskin.skin.sources.kinds import SOURCE_KINDS
 
 from .sensor_keys import FILE_KEYS, SENSOR_KEYS
 
-__all__ = [
-    "ARM_KEYS",
-    "BODY_KEYS",
-    "COMMISSIONING_KEYS",
-    "CURVE_KEYS",
-    "LINK_KEYS",
-    "MAX_ROWS",
-    "MAX_SIZE",
-    "MONITORING_KEYS",
-    "MOTION_KEYS",
-    "PADDING_KEYS",
-    "PATCH_KEYS",
-    "REACTION_KEYS",
-    "RECORDING_KEYS",
-    "RULE_KEYS",
-    "SPEED_LIMIT_KEYS",
-    "TOUCH_KEYS",
-    "scene_tables",
-    "source_keys",
-]
-
 MAX_SIZE = 256_000  #: bytes of a scene file or a sensor file; a scene of 100 sensors has 50 kB
 MAX_ROWS = 20_000  #: of a table of permissible speeds
 

@@ -11,8 +11,6 @@ from dataclasses import replace
 
 from coneskin.core.keys import Key, with_meanings
 
-__all__ = ["CALIBRATION_KEYS", "CONE_KEYS", "DOUBLE_CONE_KEYS", "FILE_KEYS", "LINK_CONE_KEYS", "SENSOR_KEYS"]
-
 _RADIUS1_KEY = Key("radius1_mm", low=1.0, high=5000.0, meaning="radius at end 1, the arc of electrode B")
 _RADIUS2_KEY = Key("radius2_mm", low=1.0, high=5000.0, meaning="radius at end 2, the arc of electrode A")
 _HEIGHT_KEY = Key(

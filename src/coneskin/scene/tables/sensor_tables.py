@@ -26,16 +26,6 @@ if TYPE_CHECKING:
     from coneskin.skin.electronics import Thresholds
     from coneskin.skin.sensor import Sensor
 
-__all__ = [
-    "build_sensor",
-    "inline_sensor_files",
-    "merge_sensor_file",
-    "named_files",
-    "read_links",
-    "sensor_tables",
-    "with_key_names",
-]
-
 _NEEDS_CALIBRATION = "touch_force_n"
 _CALIBRATION_NAMES = ("calibration", *(key.name for key in CALIBRATION_KEYS))
 

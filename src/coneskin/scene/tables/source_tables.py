@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-__all__ = ["read_sources", "read_touch", "source_label"]
-
 
 def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
     """Check a [source] table, or several [[source]], and convert them.

@@ -28,14 +28,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.scene.values.scene import Scene
 
-__all__ = [
-    "check_speed_limit",
-    "inline_speed_limit",
-    "limit_digest",
-    "limit_fingerprint",
-    "read_speed_limit",
-]
-
 _MODEL_NUMBER = 1  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
 _MAX_LINES = 10  # of mistakes

@@ -23,15 +23,6 @@ from .scene import facts_digest, sensor_facts
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-__all__ = [
-    "CalibrationRecord",
-    "TouchResult",
-    "add_calibration",
-    "calibration_keys",
-    "calibration_path",
-    "sensor_fingerprint",
-]
-
 _MAX_BYTES = 1 << 20  # of a file, about 250 calibrations
 _FIELD_KINDS = {"float": float, "int": int, "str": str, "bool": bool}  # of a record's fields that are one value each
 _HOW_TO = "see `coneskin calibrate`"

@@ -22,23 +22,6 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
-__all__ = [
-    "BODY_KINDS",
-    "ArmScene",
-    "BodyScene",
-    "Commissioning",
-    "LimitedPatch",
-    "LinkScene",
-    "MotionScene",
-    "PlacedSensor",
-    "RecordingScene",
-    "Scene",
-    "SourceScene",
-    "SpeedLimitScene",
-    "facts_digest",
-    "sensor_facts",
-]
-
 #: kind of a body -> what it is
 BODY_KINDS = {
     "wall": "a plate that does not give way",

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from .sheet_surface import SheetSurface
 
-__all__ = ["SHEET_COLOURS", "gradient", "level_bars", "level_colour", "level_words"]
-
 _COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
 #: quiet, touched and firm: from dark to bright, each with a contrast of 3 and more to the one before, to any eye
 SHEET_COLOURS = (12, 44, 74), (214, 70, 224), (255, 248, 200)

@@ -24,17 +24,6 @@ if TYPE_CHECKING:
 
     from .sheet_surface import SheetSurface
 
-__all__ = [
-    "PHASES",
-    "SQUARE",
-    "ContactOnSheet",
-    "FieldPatches",
-    "SheetField",
-    "field_patches",
-    "linear",
-    "potential_colours",
-]
-
 #: what can be drawn -> the phase, and whether it is the upper sheet
 PHASES = {
     "radial phase, upper sheet": ("radial", True),

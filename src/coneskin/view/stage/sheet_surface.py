@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from coneskin.scene.build import SensorOnArm
     from coneskin.skin.sensor import Sensor
 
-__all__ = ["SheetSurface", "sheet_surfaces"]
-
 _SHEET_HEIGHT = (
     0.0015  # m above the surface that is sensed: the sheets are that thick, and their link is not to shine through
 )

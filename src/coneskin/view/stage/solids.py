@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
     from coneskin.scene.values.scene import BodyScene
 
-__all__ = ["Solid", "along", "arm_solids", "barrel", "body_solids", "joined", "quaternion", "revolve"]
-
 
 def along(normal: Vector) -> Pose:
     """Return a pose whose z axis is along a direction."""

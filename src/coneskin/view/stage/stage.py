@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
-__all__ = ["CLEAR", "SPACING", "Stage", "floor_lines", "set_stage"]
-
 CLEAR = 0.3  #: opacity of a solid in which part of a sheet is buried
 _MIN_HIDDEN_SHARE = 0.005  # share of a sheet from which on it counts
 _ROWS, _COLUMNS = 16, 48  # places of a sheet that are looked at
