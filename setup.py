@@ -30,7 +30,7 @@ COMPILED = {
 UNFIT = {"journal", "deadman", "protocol"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays
 PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
-PREPARATION |= {"inverse_kinematics", "compiled_kinematics", "registry"}
+PREPARATION |= {"inverse_kinematics", "registry"}
 PROCESSES = {"backup_stop", "guard_watchdog", "driver", "driver_process", "examination", "input_writers"}
 PROCESSES |= {"model_check", "program_io", "rtde_connection", "state_reader", "stop_sockets", "ur_rtde"}
 PURE = UNFIT | PREPARATION | PROCESSES

@@ -86,7 +86,7 @@ HOT = {
     "skin/detection": "stream detector events",
     "skin/detection/frame": "contact_matrix reading timing untouched",
     "skin/detection/place": "touch_place touch_filter place_estimate single_contact seam_contact",
-    "robot/arm": "kinematics compiled_kinematics damped_least_squares vectors workspace",
+    "robot/arm": "kinematics damped_least_squares vectors workspace",
     "robot/reaction": "retreat types",
     "robot/guard": "core phase arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",

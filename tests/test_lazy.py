@@ -22,7 +22,7 @@ VIRTUAL = {
     "coneskin.skin.virtual.pseudo_terminal",
 }
 FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}
-KINEMATICS = {"coneskin.robot.arm.kinematics", "coneskin.robot.arm.compiled_kinematics"}
+KINEMATICS = {"coneskin.robot.arm.kinematics", "coneskin.robot.arm.damped_least_squares"}
 SIMULATOR = {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.process", "coneskin.robot.sim.server"}
 CALIBRATION = {
     "coneskin.commissioning.calibration",
@@ -104,7 +104,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         _STOP,
         _BUILD,
         {*LOADED, "coneskin.robot.arm.kinematics", "coneskin.robot.reaction.types"},
-        {"coneskin.robot.arm.compiled_kinematics"}
+        {"coneskin.robot.arm.damped_least_squares"}
         | HEAVY
         | VIRTUAL
         | FIELD
@@ -191,7 +191,7 @@ def test_what_is_not_named_is_not_loaded(case: str, tmp_path: Path, a_run: str) 
 
 def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Path) -> None:
     unneeded = {"arm.models", "arm.ur_models", "reaction.retreat", "guard.arm_supervisor", "ur.state_reader"}
-    unneeded |= {"arm.compiled_kinematics", "ur.rtde_codec"}
+    unneeded |= {"arm.kinematics", "ur.rtde_codec"}
     assert not known({f"coneskin.robot.{name}" for name in unneeded}) & modules(
         _NO_TOUCH, _BUILD, tmp_path / "scene.toml", ""
     )

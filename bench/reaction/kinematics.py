@@ -2,7 +2,7 @@
 
 Hot: back to back. Paced: one call each millisecond, after sleeping, as a guard loop makes it: caches are cold. Both
 figures of a row come from the same run. pinocchio does the same work: place of a point on the link and its Jacobian; it
-does not solve for joint speeds, the rows "drive" and "retreat_step" do. Does not show: other threads, other machines.
+does not solve for joint speeds, the row "retreat_step" does. Does not show: other threads, other machines.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from bench.report import head
-from coneskin.robot.arm.compiled_kinematics import compile_contact
-from coneskin.robot.arm.kinematics import link_pose, point_jacobian
+from coneskin.robot.arm.kinematics import place_point
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
@@ -46,9 +45,6 @@ def main() -> None:
                     f"{f'{which}, {name}: {row}':44} {np.median(hot):8.2f} "
                     f"{np.median(paced):10.2f} {np.percentile(paced, 99):7.1f}"
                 )
-    start = time.perf_counter()
-    compile_contact.__wrapped__(tilted, 6)
-    print(f"\ncompile_contact, calibrated, tool, once: {1e3 * (time.perf_counter() - start):.1f} ms")
 
 
 def errors() -> None:
@@ -60,17 +56,13 @@ def errors() -> None:
             q = [source.uniform(-6.3, 6.3) for _ in range(6)]
             link = source.randint(1, 6)
             p = (source.uniform(-0.7, 0.7), source.uniform(-0.7, 0.7), source.uniform(-0.7, 0.7))
-            flat = compile_contact(arm, link).place(*q, *p, 0.0, 0.0, 1.0)
-            other = pin_place(arm, q, link, p)
-            place = max(place, *abs(np.array(link_pose(arm, q, link).apply(p)) - other), *abs(flat[:3] - other))
-            rows = pin_jacobian(arm, q, link, p)[:3]
-            slope = max(slope, abs(np.array(point_jacobian(arm, q, link, p)) - rows).max())
-            slope = max(slope, abs(np.array(flat[6:]).reshape(link, 3).T - rows[:, :link]).max())
+            point, _, columns = place_point(arm, q, link, p)
+            place = max(place, *abs(np.array(point) - pin_place(arm, q, link, p)))
+            slope = max(slope, abs(np.array(columns).T - pin_jacobian(arm, q, link, p)[:3, :link]).max())
         print(f"{name:36} {place:9.1e} {slope:15.1e}")
 
 
 def rows(arm: ArmModel, link: int) -> list[tuple[str, Callable[[], Any]]]:
-    written = compile_contact(arm, link)
     plan = plan_retreat(
         arm, ArmState(0.0, TEST_JOINTS), [ContactOnLink(link, TOOL_POINT, AWAY_DIRECTION)], Reaction(kind="retreat")
     )
@@ -88,14 +80,9 @@ def rows(arm: ArmModel, link: int) -> list[tuple[str, Callable[[], Any]]]:
         data.oMi[held.parentJoint].act(placed)
         return pin.getFrameJacobian(pin_model, data, held.parentJoint, point, pin.LOCAL_WORLD_ALIGNED)
 
-    def readable() -> Any:
-        return link_pose(arm, TEST_JOINTS, link).apply(TOOL_POINT), point_jacobian(arm, TEST_JOINTS, link, TOOL_POINT)
-
     return [
-        ("place and Jacobian", lambda: written.place(*TEST_JOINTS, *TOOL_POINT, *AWAY_DIRECTION)),
-        ("the same and joint speeds (drive)", lambda: written.drive(*TEST_JOINTS, *TOOL_POINT, *AWAY_DIRECTION)),
+        ("place and Jacobian", lambda: place_point(arm, TEST_JOINTS, link, TOOL_POINT, AWAY_DIRECTION)),
         ("retreat_step", lambda: retreat_step(plan, state)),
-        ("readable kinematics", readable),
         ("pinocchio, numpy", pinocchio),
     ]
 

@@ -90,11 +90,11 @@ def objectives(runs: int) -> None:
             columns = [(rows[0][i], rows[1][i], rows[2][i]) for i in range(link)]
             row = [sum(c * u for c, u in zip(column, away, strict=True)) for column in columns]
             least = sum(g * g for g in row) + DAMPING_FLOOR
-            for speeds, ratios in ((damped_speeds(columns, away), three), ([g / least for g in row], one)):
+            for speeds, ratios in ((damped_speeds([(columns, away)])[0], three), ([g / least for g in row], one)):
                 v = [sum(w * column[k] for w, column in zip(speeds, columns, strict=True)) for k in range(3)]
                 along = sum(a * b for a, b in zip(v, away, strict=True))
                 ratios.append(math.hypot(*(a - along * u for a, u in zip(v, away, strict=True))) / along)
-            fast3 = max(fast3, *map(abs, damped_speeds(columns, away)))
+            fast3 = max(fast3, *map(abs, damped_speeds([(columns, away)])[0]))
             fast1 = max(fast1, *(abs(g) / least for g in row))
         if three:
             three.sort()

@@ -46,25 +46,8 @@ def damping_squared(columns: Sequence[Vector]) -> float:
     return DAMPING_FLOOR + SINGULAR_DAMPING * (1.0 - smallest / SINGULAR_BELOW) ** 2
 
 
-def damped_speeds(columns: Sequence[Vector], velocity: Vector) -> list[float]:
-    """Return the joint speeds [rad/s] that move one point.
-
-    Args:
-        columns: Jacobian columns of the point for the joints that may move [m/rad]; may be empty.
-        velocity: wanted velocity of the point [m/s].
-    """
-    if not columns:
-        return []
-    damping = damping_squared(columns)
-    if len(columns) < 3:  # fewer joints than rows: solve in the joints
-        normal = [[dot(a, b) + damping * (i == j) for j, b in enumerate(columns)] for i, a in enumerate(columns)]
-        return _solve(normal, [dot(column, velocity) for column in columns])
-    y = _solve(_gram(columns, damping), list(velocity))
-    return [column[0] * y[0] + column[1] * y[1] + column[2] * y[2] for column in columns]
-
-
-def stacked_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[list[float], float]:
-    """Return the joint speeds [rad/s] that move several points at once, none against its own wanted velocity.
+def damped_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[list[float], float]:
+    """Return the joint speeds [rad/s] that move points at once, none against its own wanted velocity.
 
     Minimises the sum of |J_k qd - v_k|^2, damped, under v_k . J_k qd >= 0 for each k.
 

@@ -1,7 +1,5 @@
 """Forward kinematics of an arm, the Jacobian of points on its links, and the frames of links and meshes. Plain floats.
 
-`compiled_kinematics` generates the same for one link of one arm where microseconds count, and is tested against this.
-
     symbol    meaning
     q         joint positions [rad]
     x, y, z   axes of a DH frame, o its origin [m], all in the base frame; frame 0 is the base, 6 the flange
@@ -38,12 +36,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 
 from .model import ArmModel, Joints
-from .vectors import added, cross, scaled
+from .vectors import added, cross, dot, minus, scaled
 
 JOINTS = 6  #: number of joints
 
@@ -78,27 +77,77 @@ def link_poses(model: ArmModel, q: Sequence[float]) -> tuple[Pose, ...]:
     return tuple(_pose(frame) for frame in _frames(model, q, JOINTS))
 
 
-def point_jacobian(
-    model: ArmModel, q: Sequence[float], link: int, p_link: Vector = (0.0, 0.0, 0.0)
-) -> tuple[Joints, Joints, Joints]:
-    """Return the Jacobian of a point that is fixed on a link.
+class PlacedPoint(NamedTuple):
+    """Point that is fixed on a link, with a direction, in the base frame.
+
+    Attributes:
+        point: where it is [m].
+        direction: unit vector that turns with the link.
+        columns: of its Jacobian [m/rad], one for each joint that moves the link, from joint 1 on.
+    """
+
+    point: Vector
+    direction: Vector
+    columns: list[Vector]
+
+    def velocity(self, qd: Sequence[float]) -> Vector:
+        """Return the velocity of the point [m/s] at joint speeds [rad/s]."""
+        x = y = z = 0.0
+        for (a, b, c), speed in zip(self.columns, qd, strict=False):
+            x, y, z = x + a * speed, y + b * speed, z + c * speed
+        return x, y, z
+
+
+def place_point(
+    model: ArmModel, q: Sequence[float], link: int, p_link: Vector, direction: Vector = (0.0, 0.0, 0.0)
+) -> PlacedPoint:
+    """Return where a point that is fixed on a link is, and how the joints move it.
 
     Args:
         model: the arm.
         q: joint positions [rad], 6 numbers.
         link: link that carries the point, 0 (base) to 6 (flange).
         p_link: point in the DH frame of that link [m].
-
-    Returns:
-        x, y and z rows of the Jacobian in the base frame [m/rad], 3 x 6; columns beyond the link are zero.
+        direction: unit vector in that frame.
 
     Raises:
         KinematicsError: q has not six finite numbers, or there is no such link.
     """
     frames = _frames(model, q, link)
-    x, y, z, o = frames[-1]
-    p = added(o, added(scaled(x, p_link[0]), added(scaled(y, p_link[1]), scaled(z, p_link[2]))))
-    return _rows([cross(z, added(p, scaled(o, -1.0))) for _, _, z, o in frames[:-1]])
+    x, y, z, origin = frames[-1]
+    p = added(origin, _combined(x, y, z, p_link))
+    columns = [cross(axis, minus(p, o)) for _, _, axis, o in frames[:-1]]
+    return PlacedPoint(p, _combined(x, y, z, direction), columns)
+
+
+def point_jacobian(
+    model: ArmModel, q: Sequence[float], link: int, p_link: Vector = (0.0, 0.0, 0.0)
+) -> tuple[Joints, Joints, Joints]:
+    """Return x, y and z rows of the Jacobian of a point as ``place_point`` takes it [m/rad], 3 x 6.
+
+    Columns beyond the link are zero.
+
+    Raises:
+        KinematicsError: q has not six finite numbers, or there is no such link.
+    """
+    return _rows(place_point(model, q, link, p_link).columns)
+
+
+def link_motion(model: ArmModel, q: Sequence[float], qd: Sequence[float], link: int) -> tuple[Vector, Vector]:
+    """Return the velocity of the origin of a link's DH frame [m/s] and the turning of the link [rad/s], in that frame.
+
+    Raises:
+        KinematicsError: q has not six finite numbers, or there is no such link.
+    """
+    *joints, (x, y, z, origin) = _frames(model, q, link)
+    velocity = turn = (0.0, 0.0, 0.0)
+    for (_, _, axis, o), speed in zip(joints, qd, strict=False):
+        velocity = added(velocity, scaled(cross(axis, minus(origin, o)), speed))
+        turn = added(turn, scaled(axis, speed))
+    return (
+        (dot(x, velocity), dot(y, velocity), dot(z, velocity)),
+        (dot(x, turn), dot(y, turn), dot(z, turn)),
+    )
 
 
 def flange_jacobian(model: ArmModel, q: Sequence[float]) -> tuple[Joints, Joints, Joints, Joints, Joints, Joints]:
@@ -135,9 +184,18 @@ def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
     return frames
 
 
+def _combined(x: Vector, y: Vector, z: Vector, by: Vector) -> Vector:
+    a, b, c = by
+    return x[0] * a + y[0] * b + z[0] * c, x[1] * a + y[1] * b + z[1] * c, x[2] * a + y[2] * b + z[2] * c
+
+
 def _turned(u: Vector, v: Vector, c: float, s: float) -> tuple[Vector, Vector]:
     """Turn two axes in their own plane from u towards v."""
-    return added(scaled(u, c), scaled(v, s)), added(scaled(u, -s), scaled(v, c))
+    (ux, uy, uz), (vx, vy, vz) = u, v
+    return (
+        (ux * c + vx * s, uy * c + vy * s, uz * c + vz * s),
+        (vx * c - ux * s, vy * c - uy * s, vz * c - uz * s),
+    )
 
 
 def _pose(frame: _Frame) -> Pose:

@@ -20,8 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.kinematics import place_point
 from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.vectors import dot, minus
 from coneskin.robot.arm.workspace import reach
 
 from .types import ContactOnLink
@@ -84,9 +85,8 @@ class ContactSupervision:
         return ""
 
     def _watch(self, q: Joints, contact: ContactOnLink) -> _Watched:
-        place = compile_contact(self._model, max(contact.link, 1)).place(*q, *contact.point, *contact.normal)
-        x, y, z, nx, ny, nz = place[:6]
-        return _Watched(contact.link, contact.point, (x, y, z), (nx, ny, nz), contact.level)
+        place, normal, _ = place_point(self._model, q, contact.link, contact.point, contact.normal)
+        return _Watched(contact.link, contact.point, place, normal, contact.level)
 
     def _place(self, time: float, watched: _Watched, contact: ContactOnLink) -> str:
         if contact.location_valid:
@@ -106,9 +106,8 @@ class ContactSupervision:
     def _level(self, time: float, q: Joints, watched: _Watched, contact: ContactOnLink) -> str:
         if self._complying or watched.link == 0:
             return ""
-        x, y, z = compile_contact(self._model, watched.link).place(*q, *watched.point, 0.0, 0.0, 0.0)[:3]
-        start, normal, level = watched.start, watched.normal, contact.level
-        away = (start[0] - x) * normal[0] + (start[1] - y) * normal[1] + (start[2] - z) * normal[2]
+        point, level = place_point(self._model, q, watched.link, watched.point).point, contact.level
+        away = dot(minus(watched.start, point), watched.normal)
         if away < -_MAX_APPROACH:
             return f"the surface has moved {-1e3 * away:.1f} mm towards the touch"
         if watched.window is None:
@@ -144,7 +143,7 @@ def opposed(model: ArmModel, q: Joints, contacts: Sequence[ContactOnLink]) -> bo
     """
     if len(contacts) < 2:
         return False
-    normals = [compile_contact(model, max(c.link, 1)).place(*q, *c.point, *c.normal)[3:6] for c in contacts]
+    normals = [place_point(model, q, c.link, c.point, c.normal).direction for c in contacts]
     return any(_cosine(a, b) < 0.0 for i, a in enumerate(normals) for b in normals[:i])
 
 
@@ -256,9 +255,7 @@ class ContactApproach:
             way = sum(abs(a - b) * far for a, b, far in zip(q[:link], before, self._reach, strict=False))
             bound = sum(abs(v) * far for v, far in zip(qd[:link], self._reach, strict=False))
             return way, bound, bound
-        place = compile_contact(self._model, link).place
-        x, y, z, nx, ny, nz, *columns = place(*q, *contact.point, *contact.normal)
-        x0, y0, z0 = place(*before, *contact.point, *contact.normal)[:3]
-        vx, vy, vz = (sum(columns[3 * i + k] * qd[i] for i in range(link)) for k in range(3))
-        way = (x - x0) * nx + (y - y0) * ny + (z - z0) * nz
-        return way, math.hypot(vx, vy, vz), vx * nx + vy * ny + vz * nz
+        here = place_point(self._model, q, link, contact.point, contact.normal)
+        moved = minus(here.point, place_point(self._model, before, link, contact.point).point)
+        velocity = here.velocity(qd)
+        return dot(moved, here.direction), math.hypot(*velocity), dot(velocity, here.direction)

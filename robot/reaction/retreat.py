@@ -14,13 +14,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.compiled_kinematics import CompiledLink, compile_contact
-from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds, damping_squared, stacked_speeds
+from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
+from coneskin.robot.arm.kinematics import PlacedPoint, place_point
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.vectors import dot, minus
 from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, Workspace
 
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
@@ -43,14 +44,12 @@ class _Track:
         point: in the DH frame of the link [m].
         away: unit vector that it is to move along, in the base frame.
         start: where it was at the touch, in the base frame [m].
-        compiled: functions of the link.
     """
 
     link: int
     point: Vector
     away: Vector
     start: Vector
-    compiled: CompiledLink = field(repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +57,7 @@ class RetreatPlan:
     """Plan of a retreat, made once, at the touch, for ``retreat_step``.
 
     Attributes:
+        model: the arm.
         tracks: one for each touched point.
         reaction: the settings.
         limits: of the joints.
@@ -66,6 +66,7 @@ class RetreatPlan:
         sweep: where the whole arm was when the motion began; None where its way is not bounded.
     """
 
+    model: ArmModel
     tracks: tuple[_Track, ...]
     reaction: Reaction
     limits: JointLimits
@@ -111,12 +112,11 @@ def plan_retreat(
             return Done(f"touch on link {contact.link} at {contact.point} m has no unit normal: {contact.normal}")
         if contact.link == 0:
             return Done("the base was touched, and no joint moves it")
-        link = compile_contact(model, contact.link)
-        x, y, z, nx, ny, nz = link.place(*state.q, *contact.point, *contact.normal)[:6]
+        start, (nx, ny, nz), _ = place_point(model, state.q, contact.link, contact.point, contact.normal)
         away = (-nx / length, -ny / length, -nz / length)
-        tracks.append(_Track(contact.link, contact.point, away, (x, y, z), link))
+        tracks.append(_Track(contact.link, contact.point, away, start))
     limits = JointLimits.of(model, reaction.acceleration)
-    plan = RetreatPlan(tuple(tracks), reaction, limits, state.time, space, sweep)
+    plan = RetreatPlan(model, tuple(tracks), reaction, limits, state.time, space, sweep)
     first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
     return first if isinstance(first, Done) else plan
 
@@ -132,15 +132,9 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     q = state.q
     if not math.isfinite(sum(q)):
         return Done(f"joint positions must be finite, got {q} rad")
-    if len(plan.tracks) == 1:
-        track = plan.tracks[0]
-        ux, uy, uz = track.away
-        sx, sy, sz = track.start
-        x, y, z, away, damping, *speeds = track.compiled.drive(*q, *track.point, ux, uy, uz)
-        progress = (x - sx) * ux + (y - sy) * uy + (z - sz) * uz
-    else:
-        progress = max(_progress(track, q) for track in plan.tracks)
-        speeds, away, damping = _solve(plan, q, ())
+    placed = [place_point(plan.model, q, track.link, track.point) for track in plan.tracks]
+    progress = max(_progress(track, at.point) for track, at in zip(plan.tracks, placed, strict=True))
+    speeds, away, damping = _solve(plan, placed, ())
     left = reaction.distance - progress
     if not left > DISTANCE_TOLERANCE:
         return Done("the distance is made", progress, complete=True)
@@ -159,7 +153,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         if not blocked:
             break
         locked += blocked
-        speeds, away, damping = _solve(plan, q, locked)
+        speeds, away, damping = _solve(plan, placed, locked)
     else:
         return Done(_why_not(plan, locked, away, damping), progress)
     if locked:
@@ -201,39 +195,27 @@ def _speed(
     return speed, clipped
 
 
-def _solve(plan: RetreatPlan, q: Sequence[float], locked: Sequence[int]) -> tuple[list[float], float, float]:
-    """Solve as ``CompiledLink.drive`` does, for any number of touches and with locked joints.
-
-    Returns:
-        joint speeds for a wanted speed of 1 m/s, the speed away from the touches that they reach, and the damping.
-    """
+def _solve(plan: RetreatPlan, placed: Sequence[PlacedPoint], locked: Sequence[int]) -> tuple[list[float], float, float]:
+    """Return joint speeds for a wanted speed of 1 m/s, that away from the touches that they reach, and the damping."""
     joints = max(track.link for track in plan.tracks)
     free = [i for i in range(joints) if i not in locked]
     points = []
-    for track in plan.tracks:
-        flat = track.compiled.place(*q, *track.point, 0.0, 0.0, 1.0)[6:]
-        flat += (0.0, 0.0, 0.0) * (joints - track.link)
-        points.append(([(flat[3 * i], flat[3 * i + 1], flat[3 * i + 2]) for i in free], track.away))
-    if len(points) == 1:
-        columns, away = points[0]
-        some = damped_speeds(columns, away)
-        damping = damping_squared(columns) if columns else DAMPING_FLOOR
-    else:
-        some, damping = stacked_speeds(points)
-    made = sum(
-        value * (column[0] * u[0] + column[1] * u[1] + column[2] * u[2])
-        for columns, u in points
-        for value, column in zip(some, columns, strict=True)
-    )
+    for track, at in zip(plan.tracks, placed, strict=True):
+        columns = at.columns + [(0.0, 0.0, 0.0)] * (joints - track.link)
+        points.append(([columns[i] for i in free], track.away))
+    some, damping = damped_speeds(points)
+    made = 0.0
+    for columns, u in points:
+        for value, column in zip(some, columns, strict=True):
+            made += value * dot(column, u)
     speeds = [0.0] * joints
     for i, value in zip(free, some, strict=True):
         speeds[i] = value
     return speeds, made / len(points), damping
 
 
-def _progress(track: _Track, q: Sequence[float]) -> float:
-    place = track.compiled.place(*q, *track.point, 0.0, 0.0, 1.0)
-    return sum((place[k] - track.start[k]) * track.away[k] for k in range(3))
+def _progress(track: _Track, point: Vector) -> float:
+    return dot(minus(point, track.start), track.away)
 
 
 def _why_not(plan: RetreatPlan, locked: Sequence[int], away: float, damping: float) -> str:

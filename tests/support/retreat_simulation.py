@@ -7,8 +7,7 @@ import random
 from collections import deque
 from dataclasses import dataclass
 
-from coneskin.robot.arm.compiled_kinematics import compile_contact
-from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.kinematics import place_point
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
 from coneskin.robot.reaction.retreat import RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity
@@ -63,10 +62,9 @@ def follow(model: ArmModel, plan: RetreatPlan, q: Joints, qd: Joints = ZERO_VELO
         late: control cycles by which commands act late.
     """
     track = plan.tracks[0]
-    compiled = compile_contact(model, track.link)
 
     def place(q: Joints) -> tuple[float, float]:
-        point = compiled.place(*q, *track.point, 0.0, 0.0, 0.0)[:3]
+        point = place_point(model, q, track.link, track.point).point
         off = [p - s for p, s in zip(point, track.start, strict=True)]
         along = sum(o * u for o, u in zip(off, track.away, strict=True))
         return along, math.hypot(*(o - along * u for o, u in zip(off, track.away, strict=True)))
@@ -102,8 +100,6 @@ def follow(model: ArmModel, plan: RetreatPlan, q: Joints, qd: Joints = ZERO_VELO
         furthest = max(furthest, along)
         backwards = max(backwards, furthest - along)
         if done is not None and not waiting and not any(qd):
-            readable = link_pose(model, q, track.link).apply(track.point)
-            assert math.dist(readable, compiled.place(*q, *track.point, 0.0, 0.0, 0.0)[:3]) < 1e-9
             return FollowedRetreat(
                 done, along, drift, time - plan.start_time, joint_speed, leading, beyond, backwards, frozenset(clipped)
             )

@@ -16,8 +16,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.kinematics import place_point
 from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.vectors import dot
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.reaction.types import ContactOnLink
 
@@ -131,10 +132,8 @@ class ResistanceMonitor:
 
 def push_torque(model: ArmModel, q: Joints, contact: ContactOnLink) -> Joints:
     """Return the torques on the joints of a push of 1 N on a touch [N m], at joint positions q [rad]."""
-    place = compile_contact(model, contact.link).place(*q, *contact.point, *contact.normal)
-    nx, ny, nz, *columns = place[3:]
-    turns = [-(columns[3 * i] * nx + columns[3 * i + 1] * ny + columns[3 * i + 2] * nz) for i in range(contact.link)]
-    return _six([*turns, *[0.0] * (6 - contact.link)])
+    _, normal, columns = place_point(model, q, contact.link, contact.point, contact.normal)
+    return _six([*(-dot(column, normal) for column in columns), *[0.0] * (6 - contact.link)])
 
 
 def _nearer_zero(a: float, b: float) -> float:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from operator import mul
 
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.compiled_kinematics import compile_contact
+from coneskin.robot.arm.kinematics import link_motion
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.vectors import cross
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +73,9 @@ class SurfaceSpeeds:
 
     def __init__(self, model: ArmModel, speeds: PermissibleSpeeds) -> None:
         self._speeds = speeds
+        self._model = model
         self._links = [
-            (link, compile_contact(model, link).place, [_Row(patch) for patch in speeds.patches if patch.link == link])
+            (link, [_Row(patch) for patch in speeds.patches if patch.link == link])
             for link in sorted({patch.link for patch in speeds.patches if patch.link > 0})
         ]
 
@@ -89,13 +91,9 @@ class SurfaceSpeeds:
             return 0.0, ""
         speeds, worst, name = self._speeds, 0.0, ""
         inside = speeds.covers(q)
-        for link, place, rows in self._links:
-            twist: list[float] = []
-            for point, axis in _FRAME_POINTS:
-                _, _, _, nx, ny, nz, *columns = place(*q, *point, *axis)
-                vx, vy, vz = (sum(columns[3 * i + k] * qd[i] for i in range(link)) for k in range(3))
-                twist += (vx, vy, vz, nx, ny, nz)
-            flow = _flow(twist)
+        for link, rows in self._links:
+            velocity, turn = link_motion(self._model, q, qd, link)
+            flow = *velocity, *turn
             for row in rows:
                 speed = speeds.between * sum(map(mul, row.weights, flow))
                 if speed > 0.0:
@@ -106,29 +104,12 @@ class SurfaceSpeeds:
         return worst, name
 
 
-#: points and directions in a link's frame, at which its motion is read off
-_FRAME_POINTS = (
-    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
-    ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
-)
-
-
 class _Row:
-    """Patch with the weights that make its speed along the normal of the speeds of four points of its link."""
+    """Patch with the weights that make its speed along the normal of the velocity and the turning of its link."""
 
     def __init__(self, patch: PermissiblePatch) -> None:
         self.patch = patch
-        x, y, z = patch.point
-        self.weights = [share * n for share in (1.0 - x - y - z, x, y, z) for n in patch.normal]
-
-
-def _flow(twist: Sequence[float]) -> list[float]:
-    """Return the speeds of the four points along the axes of the frame of the link [m/s], as ``_Row`` weighs them."""
-    axes = [twist[6 * number + 3 : 6 * number + 6] for number in range(3)]
-    speeds = [twist[6 * number : 6 * number + 3] for number in range(4)]
-    return [sum(map(mul, axis, speed)) for speed in speeds for axis in axes]
+        self.weights = (*patch.normal, *cross(patch.point, patch.normal))
 
 
 def _interpolate(levers: Sequence[float], curve: Sequence[float], lever: float) -> float:

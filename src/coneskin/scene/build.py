@@ -96,8 +96,6 @@ def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     paths: tuple[StopPath, ...] = INTERNAL_PATHS if scene.arm.control == "internal" else EXTERNAL_PATHS
     if not scene.arm.slider_stop:
         paths = tuple(path for path in paths if path is not StopPath.SLIDER)
-    if rules.kinds - {"stop"}:
-        _compile_links(scene, arm)
     planner = _planner(scene, arm, placed) if rules.move else None
     heartbeat = None
     if scene.arm.control == "external":
@@ -157,16 +155,6 @@ def _planner(scene: Scene, arm: ArmModel, placed: Sequence[SensorOnArm]) -> Reac
     table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)
     watchdog = scene.arm.watchdog_hz if scene.arm.control == "external" else None
     return ReactionPlanner(arm, watchdog, table, BareSides(arm, [(item.link, item.frustum) for item in placed]))
-
-
-def _compile_links(scene: Scene, arm: ArmModel) -> None:
-    """Compile the kinematics of the scene's links: 2 ms each, for which the first touch must not wait."""
-    from coneskin.robot.arm.compiled_kinematics import compile_contact
-    from coneskin.robot.arm.kinematics import link_index
-
-    for link in scene.links:
-        if index := link_index(link.name):
-            compile_contact(arm, index)
 
 
 @dataclass(frozen=True, slots=True)

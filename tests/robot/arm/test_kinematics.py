@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.core.errors import KinematicsError
+from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import (
     LINK_INDEX,
     dh_link,
@@ -19,13 +20,15 @@ from coneskin.robot.arm.kinematics import (
     forward,
     link_index,
     link_mesh,
+    link_motion,
     link_pose,
     link_poses,
+    place_point,
     point_jacobian,
 )
-from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
-from tests.robot.arms import FAR_UR10, NEAR_UR10, NOMINAL, arms, joints, points
+from tests.robot.arms import FAR_UR10, NEAR_UR10, NOMINAL, arms, joints, points, units
 from tests.support.paths import SHARED_DATA
 from tests.support.pinocchio_arm import pin_jacobian, pin_place, pin_rotation
 
@@ -72,6 +75,18 @@ def test_the_jacobian_is_the_derivative_of_the_place(
         up, down = ([*q[:i], q[i] + step, *q[i + 1 :]] for step in (h, -h))
         slope = (np.array(link_pose(arm, up, link).apply(p)) - link_pose(arm, down, link).apply(p)) / (2 * h)
         np.testing.assert_allclose(rows[:, i], slope, rtol=0, atol=2e-9)
+
+
+@given(arms(), joints(), LINKS, points(), units(), joints())
+def test_a_point_turns_with_its_link_and_moves_as_its_jacobian_says(
+    arm: ArmModel, q: Joints, link: int, p: Vector, n: Vector, qd: Joints
+) -> None:
+    pose, placed = link_pose(arm, q, link), place_point(arm, q, link, p, n)
+    assert [*placed.point, *placed.direction] == pytest.approx([*pose.apply(p), *pose.rotate(n)], rel=0, abs=4e-15)
+    velocity = np.array(point_jacobian(arm, q, link, p)) @ qd
+    np.testing.assert_allclose(placed.velocity(qd), velocity, rtol=0, atol=1e-12)
+    along, turn = link_motion(arm, q, qd, link)
+    np.testing.assert_allclose(pose.rotate(tuple(np.add(along, np.cross(turn, p)))), velocity, rtol=0, atol=1e-12)
 
 
 @pytest.mark.long
