@@ -144,5 +144,5 @@ def test_what_clips_is_said(reaction: Reaction, reason: str) -> None:
 def test_a_retreat_without_contact_or_with_a_link_that_is_not_there_is_refused() -> None:
     with pytest.raises(KinematicsError, match="at least one contact"):
         planned(UR10E, Q, [])
-    with pytest.raises(KinematicsError, match="link must be 0 .* to 6"):
+    with pytest.raises(KinematicsError, match=r"link must be 0 .* to 6"):
         planned(UR10E, Q, [replace(FOREARM, link=7)])
