@@ -7,33 +7,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coneskin.core.arrays import frozen
 from coneskin.core.errors import GeometryError, MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Floats = NDArray[np.float64]
 
 
 def widest_nearby(values: Floats, rows: int, columns: int) -> Floats:
     """Return the greatest value among neighbours up to a number of rows and columns away."""
-    grown = values.copy()
-    for axis, count in ((0, rows), (1, columns)):
-        wide = grown.copy()
-        for step in range(1, count + 1):
-            here, there = [slice(None)] * 2, [slice(None)] * 2
-            here[axis], there[axis] = slice(step, None), slice(None, -step)
-            wide[tuple(here)] = np.maximum(wide[tuple(here)], grown[tuple(there)])
-            wide[tuple(there)] = np.maximum(wide[tuple(there)], grown[tuple(here)])
-        grown = wide
-    return grown
+    from scipy.ndimage import maximum_filter
+
+    return np.asarray(maximum_filter(values, (2 * rows + 1, 2 * columns + 1), mode="nearest"))
 
 
 def without_undercut(radius: Floats, phi: Floats) -> Floats:
@@ -47,45 +41,11 @@ def without_undercut(radius: Floats, phi: Floats) -> Floats:
     return opened
 
 
-Indices = NDArray[np.int64]
-
-_WELD_DISTANCE = 1e-7  # m; corners nearer to each other are one
-_STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_WELD_DIGITS = 7  # of a metre; corners that agree so far are one
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ClosedSurface:
-    """Triangles that enclose a solid; every edge belongs to two of them.
-
-    Attributes:
-        vertices: corners [m], shape (n, 3).
-        faces: indices of three corners, anticlockwise as seen from outside, shape (m, 3).
-    """
-
-    vertices: Floats
-    faces: Indices
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
-        faces = np.array(self.faces, dtype=np.int64)
-        faces.setflags(write=False)
-        object.__setattr__(self, "faces", faces)
-
-    @property
-    def volume(self) -> float:
-        """Volume of the solid [m3]."""
-        a, b, c = self.vertices[self.faces].transpose(1, 0, 2)
-        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-
-    @property
-    def size(self) -> tuple[float, float, float]:
-        """Extents along the axes [m]."""
-        x, y, z = np.ptp(self.vertices, axis=0).tolist()
-        return x, y, z
-
-
-def shell_surface(inner: ArrayLike, outer: ArrayLike) -> ClosedSurface:
-    """Return the surface of the shell between two grids of points.
+def shell_surface(inner: ArrayLike, outer: ArrayLike) -> Trimesh:
+    """Return the closed surface of the shell between two grids of points, its faces turned outwards.
 
     Args:
         inner: points of one face [m], shape (rows, columns, 3).
@@ -94,6 +54,8 @@ def shell_surface(inner: ArrayLike, outer: ArrayLike) -> ClosedSurface:
     Raises:
         GeometryError: the grids differ, are too small, or enclose nothing.
     """
+    from trimesh import Trimesh
+
     inner, outer = np.asarray(inner, float), np.asarray(outer, float)
     if inner.shape != outer.shape or inner.ndim != 3 or min(inner.shape[:2]) < 2:
         raise GeometryError(f"two grids of at least 2 x 2 points are needed, got {inner.shape} and {outer.shape}")
@@ -109,30 +71,22 @@ def shell_surface(inner: ArrayLike, outer: ArrayLike) -> ClosedSurface:
         low, high = loop[steps], loop[steps + 1]
         low_out, high_out = loop[2 * rows - 1 - steps], loop[2 * rows - 2 - steps]
         faces += [np.stack([low, high, high_out], -1)[:, ::order], np.stack([low, high_out, low_out], -1)[:, ::order]]
-    corners = loops.reshape(-1, 3)
-    _, first, inverse = np.unique(np.round(corners / _WELD_DISTANCE), axis=0, return_index=True, return_inverse=True)
-    joined = inverse.reshape(-1)[np.concatenate([face.reshape(-1, 3) for face in faces])]
-    a, b, c = joined.T
-    joined = joined[(a != b) & (b != c) & (c != a)]
-    surface = ClosedSurface(corners[first], joined)
-    if surface.volume < 0.0:
-        surface = ClosedSurface(surface.vertices, joined[:, ::-1])
-    if not surface.volume > 0.0:
+    shell = Trimesh(loops.reshape(-1, 3), np.concatenate([face.reshape(-1, 3) for face in faces]), process=False)
+    shell.merge_vertices(digits_vertex=_WELD_DIGITS)
+    a, b, c = shell.faces.T
+    shell.update_faces((a != b) & (b != c) & (c != a))
+    if len(shell.faces) and shell.volume < 0.0:
+        shell.invert()
+    if not (len(shell.faces) and shell.volume > 0.0):
         raise GeometryError("the two faces of the shell enclose nothing")
-    return surface
+    return shell
 
 
-def to_stl(surface: ClosedSurface, title: str = "") -> bytes:
+def to_stl(surface: Trimesh, title: str = "") -> bytes:
     """Return a surface as a binary STL file in millimetres, the unit that printing programs take."""
-    corners = (1e3 * surface.vertices).astype("<f4")[surface.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    table = np.zeros(len(corners), _STL_FACE)
-    table["normal"] = normals / np.where(length > 0.0, length, 1.0)
-    table["corners"] = corners
+    data = bytes(surface.copy().apply_scale(_MM_PER_M).export(file_type="stl"))
     # a header that begins with "solid" would be taken for text
-    header = f"binary STL, mm: {title}".encode("ascii", "replace")[:80].ljust(80)
-    return header + len(table).to_bytes(4, "little") + table.tobytes()
+    return f"binary STL, mm: {title}".encode("ascii", "replace")[:80].ljust(80) + data[80:]
 
 
 _MM_PER_M = 1e3

@@ -33,7 +33,7 @@ from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.solid import ClosedSurface, WrappedLayer, write_step
+from coneskin.geometry.solid import WrappedLayer, write_step
 
 SAMPLE_COUNT = 40_000  # on the faces of a link beside a part, and on the part
 NEAREST_COUNT = 800  # of them whose distance is computed
@@ -176,7 +176,7 @@ def jig(path: Path) -> Iterator[str]:
             yield f"  {path.name} {sheet.name}: {sentence}"
 
 
-def _gap(sheet: SheetDesign, collar: Collar, surface: ClosedSurface, body: Mesh) -> tuple[float, bool]:
+def _gap(sheet: SheetDesign, collar: Collar, surface: trimesh.Trimesh, body: Mesh) -> tuple[float, bool]:
     """Return the distance of the link from a part [mm], negative where it is in the plastic, and whether they meet.
 
     They meet if an edge of one crosses a face of the other, or if a point of the link is in the plastic.

@@ -311,7 +311,7 @@ def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
         middles = [0.5 * (part.start + part.end) for part in collar.parts]
         ways = [np.array([math.cos(middle), turned * math.sin(middle), 0.0]) for middle in middles]
         body, owner = _body(
-            part.surface.vertices[part.surface.faces] + 0.5 * _PART_DISTANCE * max(part.surface.size[:2]) * way
+            part.surface.vertices[part.surface.faces] + 0.5 * _PART_DISTANCE * max(part.surface.extents[:2]) * way
             for part, way in zip(collar.parts, ways, strict=True)
         )
         turn = _clear_azimuth(turned * angle for part in collar.parts for angle in (part.start, part.end))

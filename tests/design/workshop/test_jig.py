@@ -79,7 +79,7 @@ def test_every_part_is_a_watertight_solid(frustum: Frustum, parts: int) -> None:
             assert solid.is_winding_consistent
             assert solid.body_count == 1
             assert solid.volume == pytest.approx(1e9 * part.surface.volume, rel=1e-4)
-            assert solid.extents == pytest.approx(1e3 * np.array(part.surface.size), abs=1e-3)
+            assert solid.extents == pytest.approx(1e3 * np.array(part.surface.extents), abs=1e-3)
         assert len(collar.parts) == (1 if frustum.wrap < math.pi else parts)
 
 

@@ -287,7 +287,7 @@ class BuildFigures:
                             "file": f"jig/{collar.slug(part)}.stl",
                             "from_deg": round(math.degrees(part.start), 3) + 0.0,
                             "to_deg": round(math.degrees(part.end), 3) + 0.0,
-                            "size_mm": [_mm(length) for length in part.surface.size],
+                            "size_mm": [_mm(length) for length in part.surface.extents],
                             "volume_cm3": round(1e6 * part.surface.volume, 2),
                         }
                         for part in collar.parts

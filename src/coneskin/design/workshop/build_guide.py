@@ -340,7 +340,7 @@ def _jig_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Itera
         place = "jig/" if folder == "." else f"{folder}/jig/"
         for collar in figures.collars:
             for part in collar.parts:
-                size = " x ".join(f"{1e3 * length:.0f}" for length in part.surface.size)
+                size = " x ".join(f"{1e3 * length:.0f}" for length in part.surface.extents)
                 volume = f"{1e6 * part.surface.volume:.0f} cm3"
                 yield f"| `{place}{collar.slug(part)}.stl` | end {collar.end}, part {part.number} | {size} | {volume} |"
         yield ""

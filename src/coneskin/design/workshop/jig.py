@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +22,12 @@ from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.solid import ClosedSurface, shell_surface, widest_nearby, without_undercut
+from coneskin.geometry.solid import shell_surface, widest_nearby, without_undercut
 
 from .link_excess import LinkExcess
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Floats = NDArray[np.float64]
 
@@ -139,7 +143,7 @@ class _CollarPart:
     number: int
     start: float
     end: float
-    surface: ClosedSurface
+    surface: Trimesh
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -290,7 +294,7 @@ class _Builder:
         free = -widest_nearby(-free[None], 0, 1)[0]
         return np.where(free < _MIN_LIP_PIECE, 0.0, free)
 
-    def _part(self, phi: Floats, lengths: Floats, number: int) -> ClosedSurface:
+    def _part(self, phi: Floats, lengths: Floats, number: int) -> Trimesh:
         """Return the shell of one part."""
         plan = self.plan
         count = max(2, math.ceil(float(lengths.max()) / _ROW_STEP)) + 1
