@@ -75,9 +75,11 @@ def shell_surface(inner: ArrayLike, outer: ArrayLike) -> Trimesh:
     shell.merge_vertices(digits_vertex=_WELD_DIGITS)
     a, b, c = shell.faces.T
     shell.update_faces((a != b) & (b != c) & (c != a))
-    if len(shell.faces) and shell.volume < 0.0:
+    with np.errstate(divide="ignore", invalid="ignore"):  # the centre of nothing
+        volume = shell.volume if len(shell.faces) else 0.0
+    if volume < 0.0:
         shell.invert()
-    if not (len(shell.faces) and shell.volume > 0.0):
+    if not abs(volume) > 0.0:
         raise GeometryError("the two faces of the shell enclose nothing")
     return shell
 
