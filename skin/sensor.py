@@ -46,7 +46,7 @@ def sheet_resistances(frustum: Frustum, upper_sheet_ohms: float, lower_sheet_ohm
     return upper_sheet_ohms * frustum.slant / breadth, lower_sheet_ohms * breadth / frustum.slant
 
 
-class Bounds(NamedTuple):
+class _Bounds(NamedTuple):
     """The limits of a sensor in counts of its converter, computed once for the live path."""
 
     full: int  #: highest count
@@ -103,7 +103,7 @@ class Sensor:
     place_map: PlaceMap | None = None
     force_table: ForceTable | None = None
     tolerance: SheetTolerance = FILM_SHEETS
-    bounds: Bounds = field(init=False, repr=False, compare=False)
+    bounds: _Bounds = field(init=False, repr=False, compare=False)
     _from_end1: LogScale = field(init=False, repr=False, compare=False)
     _from_end2: LogScale = field(init=False, repr=False, compare=False)
     b_positive: bool = field(init=False, repr=False, compare=False)
@@ -198,7 +198,7 @@ class Sensor:
         slope = self._from_end1.slope(u) * self.electronics.supply_volts
         return -slope if self.b_positive else slope
 
-    def _work_out_bounds(self) -> Bounds:
+    def _work_out_bounds(self) -> _Bounds:
         parts, limits = self.electronics, self.thresholds
         full = parts.full_count
         volt, ampere = full / parts.adc_volts, full / parts.current_full_scale
@@ -215,7 +215,7 @@ class Sensor:
         supply = parts.supply_volts * volt
         leads, ohm = parts.lead_ohms, volt / ampere
         largest_touch = 2.0 * parts.supply_volts / parts.pulldown_ohms * ampere
-        return Bounds(
+        return _Bounds(
             full=full,
             supply_low=round(supply * (1.0 - limits.supply_tolerance)),
             supply_high=min(round(supply * (1.0 + limits.supply_tolerance)), full - 1),

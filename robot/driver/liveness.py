@@ -15,7 +15,7 @@ HOLD_UP_LIMIT: Final = 0.5  #: s for which a process that waits for a processor 
 SETPOINT_SILENCE: Final = 0.1  #: s without a ``SetJointVelocity``, sent every 4 ms while the guard itself moves the arm
 
 
-class Liveness(NamedTuple):
+class _Liveness(NamedTuple):
     """One row: a process that may die or fall silent.
 
     Attributes:
@@ -34,17 +34,17 @@ class Liveness(NamedTuple):
 
 
 LIVENESS: Final = (
-    Liveness("your program", "guard", "it is not suspended", "program_silence_ms", "stops the arm, latches"),
-    Liveness(
+    _Liveness("your program", "guard", "it is not suspended", "program_silence_ms", "stops the arm, latches"),
+    _Liveness(
         "driver process, watchdogs",
         "guard",
         "heartbeat",
         "4/3 program_silence_ms",
         "stops the arm by another path, latches",
     ),
-    Liveness("guard", "driver process, first watchdog", "heartbeat", GUARD_SILENCE, "stops the arm"),
-    Liveness("guard", "second watchdog", "heartbeat", UNGUARDED_TIME, "stops the arm, holds it"),
-    Liveness("guard", "your program", "its reports", UNGUARDED_TIME, "raises RobotConnectionError"),
-    Liveness("guard that moves the arm", "driver process", "setpoints", SETPOINT_SILENCE, "stops the arm"),
-    Liveness("driver process", "controller", "writes", "1 / watchdog_hz", "ends its program"),
+    _Liveness("guard", "driver process, first watchdog", "heartbeat", GUARD_SILENCE, "stops the arm"),
+    _Liveness("guard", "second watchdog", "heartbeat", UNGUARDED_TIME, "stops the arm, holds it"),
+    _Liveness("guard", "your program", "its reports", UNGUARDED_TIME, "raises RobotConnectionError"),
+    _Liveness("guard that moves the arm", "driver process", "setpoints", SETPOINT_SILENCE, "stops the arm"),
+    _Liveness("driver process", "controller", "writes", "1 / watchdog_hz", "ends its program"),
 )

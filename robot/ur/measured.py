@@ -25,7 +25,7 @@ _WATCHDOG_LATENESS = 0.02  # s, that the simulated controller's never reaches
 
 
 @dataclass(frozen=True, slots=True)
-class MeasuredController:
+class _MeasuredController:
     """Times of one controller.
 
     Attributes:
@@ -45,7 +45,7 @@ class MeasuredController:
     slows: float
 
 
-def read_measured(path: Path) -> MeasuredController:
+def read_measured(path: Path) -> _MeasuredController:
     """Read the file of scripts/measure_controller.py.
 
     Raises:
@@ -57,7 +57,7 @@ def read_measured(path: Path) -> MeasuredController:
         ended = [stop for stop in joints if stop["path"] == "command"]
         ways = [stop["way_rad"]["p50"] - stop["speed"] * stop["slows_s"]["p50"] for stop in ended]
         rates = [stop["speed"] ** 2 / (2.0 * way) for stop, way in zip(ended, ways, strict=True) if way > 0.0]
-        found = MeasuredController(
+        found = _MeasuredController(
             f"{facts['model']}, {facts['version']}, {facts['date']}",
             (float(facts["start_s"]["p50"]), float(facts["start_s"]["p95"])),
             (float(facts["watchdog_s"]["p50"]), float(facts["watchdog_s"]["worst"])),
@@ -76,7 +76,7 @@ def read_measured(path: Path) -> MeasuredController:
 
 
 def compare(
-    measured: MeasuredController, escalate: float, stop_budget: Callable[[float, float], float]
+    measured: _MeasuredController, escalate: float, stop_budget: Callable[[float, float], float]
 ) -> list[Finding]:
     """Return what a guard's limits must be with a controller as it was measured.
 

@@ -73,7 +73,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
         return None
     from .run_files import is_further_part
 
-    return None if is_further_part(file_path) else RecordedRunFile.from_parent(parent, path=file_path)
+    return None if is_further_part(file_path) else _RecordedRunFile.from_parent(parent, path=file_path)
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -82,15 +82,15 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.write_line(f"coneskin: golden events written: {name}; review the difference before you commit")
 
 
-class RecordedRunFile(pytest.File):
+class _RecordedRunFile(pytest.File):
     """Recording, as pytest collects it."""
 
     def collect(self) -> Iterator[pytest.Item]:
         """Yield its one test."""
-        yield RecordedRunItem.from_parent(self, name="golden")
+        yield _RecordedRunItem.from_parent(self, name="golden")
 
 
-class RecordedRunItem(pytest.Item):
+class _RecordedRunItem(pytest.Item):
     """Test of one recording against its golden events."""
 
     def runtest(self) -> None:
