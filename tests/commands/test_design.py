@@ -237,6 +237,7 @@ def test_a_failure_halfway_leaves_nothing(tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_folder_is_replaced_only_by_force_and_only_if_it_is_a_design(tmp_path, capsys, cylinder_design):
     out = tmp_path / "out"
     shutil.copytree(cylinder_design, out)
@@ -340,6 +341,7 @@ def test_pictures_of_discs_wide_sectors_and_partial_wraps(words, tmp_path):
     assert (tmp_path / "out" / "pictures" / "link.png").is_file()
 
 
+@pytest.mark.long
 def test_help_shows_examples_that_run(tmp_path, monkeypatch):
     """Every example of --help that needs no mesh."""
     monkeypatch.chdir(tmp_path)

@@ -153,6 +153,7 @@ def test_what_a_sheet_spans_is_said_beside_its_deviation(tmp_path: Path, capsys:
     assert "% of it spans holes and grooves, down to 1." in line
 
 
+@pytest.mark.long
 def test_no_share_is_said_that_prints_as_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_mesh_from_file_to_sensor_in_the_meshs_frame(tmp_path, capsys):
     assert "pictures" not in (tmp_path / "out" / "report.md").read_text()
 
 
+@pytest.mark.long
 def test_a_link_of_a_urdf(tmp_path, capsys):
     stl(tmp_path / "cone.stl", list(tube(40.0e-3, 50.0e-3, 160.0e-3)))
     mesh = '<geometry><mesh filename="cone.stl" scale="2 2 2"/></geometry><origin xyz="0 0 1"/>'

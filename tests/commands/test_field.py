@@ -23,6 +23,7 @@ def test_numbers_of_a_cylinder_are_those_by_hand(capsys: pytest.CaptureFixture[s
     assert facts["pictures"] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cone", [CONE, CYLINDER], ids=("sector", "rectangle"))
 def test_every_picture_is_drawn(cone: list[str], tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")

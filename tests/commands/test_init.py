@@ -39,6 +39,7 @@ def test_a_design_ends_with_the_next_command(tmp_path: Path, capsys: Output) -> 
     assert capsys.readouterr().out.splitlines()[-1].startswith(f"next: coneskin init '{tmp_path / 'my skin'}'")
 
 
+@pytest.mark.long
 def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output) -> None:
     assert main(["init", "skin", "--simulated", "--link", "upperarm"]) == 0
     assert capsys.readouterr().out.splitlines() == [

@@ -35,6 +35,7 @@ def test_another_scene_is_a_what_if_as_well(tmp_path: Path, capsys: pytest.Captu
     assert "exclude each other" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_folder_of_runs_is_listed_and_several_runs_are_summed_up(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -63,6 +63,7 @@ def test_what_lies_beside_a_run_in_its_folder_is_verified_as_well(
     assert len(facts(capsys, "list", str(tmp_path))["runs"]) == 2
 
 
+@pytest.mark.long
 def test_cut_and_diff(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = tmp_path / "cut.rec"
     made = facts(capsys, "cut", str(COLLISION), "--around", "2.95", "--keep", "0.6", "-o", str(target))

@@ -143,6 +143,7 @@ def test_every_row_opens_a_source_of_its_own_keys() -> None:
         assert isinstance(open_source(kind, settings, "loop://"), Source)
 
 
+@pytest.mark.long
 def test_only_the_table_names_a_class_of_source() -> None:
     product = [path for folder in ("skin", "robot", "src/coneskin") for path in (ROOT / folder).rglob("*.py")]
     named = {

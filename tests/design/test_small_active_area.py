@@ -54,6 +54,7 @@ def test_nothing_is_said_of_a_sheet_of_which_three_tenths_are_active():
     assert min(shares.values()) < 0.30 < max(shares.values())
 
 
+@pytest.mark.long
 def test_report_and_command_line_warn_alike(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     words = ["design", "--radius1-mm", "36", "--height-mm", "25", "--no-pictures"]
     assert main([*words, "-o", str(tmp_path / "a")]) == 0

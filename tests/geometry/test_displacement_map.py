@@ -149,6 +149,7 @@ def test_a_barrel_is_followed_to_microns() -> None:
         assert np.abs(error).max() < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", sweep(["ur/ur10/collision/upperarm.stl", "ur/ur5e/visual/upperarm.dae", "xarm/uf850_link4.stl"])
 )

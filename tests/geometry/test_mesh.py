@@ -280,6 +280,7 @@ def test_options_out_of_range(tmp_path: Path) -> None:
         load_mesh(tmp_path / "a.stl", unit="yard")
 
 
+@pytest.mark.long
 def test_a_document_as_deep_as_it_is_long_is_read_once(tmp_path: Path) -> None:
     """Each end of an element copied the names of all around it: a minute for a megabyte, the square of it for more."""
     deep = b"<COLLADA>" + b"<a>" * 150_000 + b"<unit meter='3'/>" + b"</a>" * 150_000 + b"</COLLADA>"

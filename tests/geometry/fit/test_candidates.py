@@ -14,6 +14,7 @@ from ..synthetic import frustum, rugby, shoulder
 from .axis_cases import hull
 
 
+@pytest.mark.long
 def test_candidates_are_told_apart() -> None:
     for body, cones in ((rugby(), 1), (frustum(0.05, 0.05, 0.3), 1), (shoulder(), 2)):
         found = find_axis_candidates(hull(body, 2000))

@@ -167,6 +167,7 @@ def test_bolt_holes_are_bridged_and_said() -> None:
     assert short.length_share < 0.5
 
 
+@pytest.mark.long
 def test_a_shoulder_gets_a_partial_wrap() -> None:
     sheet = cones(placed(shoulder())).sheets[0]
     assert math.degrees(sheet.frustum.wrap) == pytest.approx(230.0, abs=10.0)
@@ -436,6 +437,7 @@ def test_ur5e_links_from_exploded_collada(name: str, radius: float, length: floa
     assert any("welded" in note for note in fit.notes)
 
 
+@pytest.mark.long
 def test_ur5e_forearm_narrows() -> None:
     sheet = find_cones(link("ur/ur5e/visual/forearm.dae"), max_sheets=1).sheets[0]
     assert -0.10 < math.degrees(sheet.frustum.half_angle) < -0.04

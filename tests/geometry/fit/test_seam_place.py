@@ -38,6 +38,7 @@ def fitted(mesh: Mesh) -> LinkFit:
     return cones(mesh, max_sheets=1, wrap=2 * math.pi)
 
 
+@pytest.mark.long
 def test_the_seam_lies_behind_what_stands_out() -> None:
     azimuth = 3.0
     mesh = tube_with_wing(azimuth)

@@ -106,6 +106,7 @@ def test_the_floor_of_a_right_angled_groove_sees_what_the_formula_says() -> None
     assert float(exposure_weights(middle, rays).weights.mean()) == pytest.approx(expected, abs=0.03)
 
 
+@pytest.mark.long
 def test_the_sheet_goes_where_touches_count() -> None:
     mesh = placed(STEPPED)
     (plain,) = cones(mesh, max_sheets=1).sheets

@@ -58,6 +58,7 @@ def test_an_arm_that_gives_way_presses_a_body_behind_a_bare_strip_no_harder_than
     assert 0.5 * PUSH < force < 1.5 * PUSH
 
 
+@pytest.mark.long
 @pytest.mark.promise("P33")
 @pytest.mark.parametrize("kind", ["retreat", "comply"])
 def test_where_a_bare_side_would_lead_the_arm_only_stops_unless_the_scene_allows_it(kind: str) -> None:

@@ -36,6 +36,7 @@ def collide(scene: Scene, body: BodyScene = HAND, **options: object) -> Collisio
     return run
 
 
+@pytest.mark.long
 def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_the_stop_ends_the_force(
     tmp_path: Path,
 ) -> None:

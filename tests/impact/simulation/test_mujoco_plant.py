@@ -123,6 +123,7 @@ def test_a_stiff_arm_presses_a_hand_as_far_as_springs_in_series_let_it() -> None
     assert padding.elastic(contact.depth) == pytest.approx(contact.force, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["person", "grip"])
 def test_a_person_pushes_with_the_force_wanted_after_the_delay(kind: str) -> None:
     _, normal, _ = leading_side()

@@ -45,6 +45,7 @@ FOLDED = (0.0, -1.2, 2.6, -1.4, -1.57, 0.0)
 points = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
 
 
+@pytest.mark.long
 @given(points, points, points, points)
 @settings(max_examples=200)
 def test_a_distance_of_segments_is_that_of_coal(a, b, c, d):

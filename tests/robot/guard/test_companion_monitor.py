@@ -269,6 +269,7 @@ def names_the_right_one(seed):
     return right and abs(contact.details["u"] - places[1]["u"]) < 0.01
 
 
+@pytest.mark.long
 @pytest.mark.promise("P04")
 @pytest.mark.parametrize("seeds", sweep([range(8), range(8, 70)]))
 def test_the_touch_that_stopped_is_named_in_each_of_70_runs(seeds):
@@ -282,6 +283,7 @@ def report(rig, kind):
     rig.feed(BlockKind.DRIVER, StatusReport(kind).encode())
 
 
+@pytest.mark.long
 @pytest.mark.promise("P20")
 def test_the_driver_s_program_may_end_where_that_was_announced_and_for_no_longer_than_5_s():
     rig = GuardRig(speed=0.0).run(0.5)

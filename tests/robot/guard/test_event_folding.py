@@ -58,6 +58,7 @@ def test_states_that_are_no_numbers_are_one_fault_and_counts():
     assert len(rig.core._faults) < 5
 
 
+@pytest.mark.long
 def test_touches_of_a_latched_arm_are_counted_and_those_of_an_active_one_are_not():
     many = [touch(1.1 + 0.04 * n, 1.12 + 0.04 * n) for n in range(24)]
     rig = GuardRig(touch(0.5, 0.7), *many, reaction=Reaction("stop"), speed=1.0).run(2.7)

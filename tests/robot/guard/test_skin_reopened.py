@@ -40,6 +40,7 @@ def refusals(rig: GuardRig) -> list[str]:
     return [reason for event in rig.events if event.name == "refused" for reason in event.details["reasons"]]
 
 
+@pytest.mark.long
 @pytest.mark.promise("P09")
 def test_the_same_device_is_guarded_again_after_a_reset_and_not_before():
     rig = unplugged()

@@ -54,12 +54,14 @@ def test_a_slow_arm_that_something_holds_is_stopped():
     )
 
 
+@pytest.mark.long
 def test_an_arm_that_recedes_from_the_touch_goes_on():
     rig = GuardRig(touch(0.5, 1.0, phi=(PHI + math.pi) % (2.0 * math.pi)), reaction=SLOW, speed=0.3).run(2.0)
     assert "stopping" not in rig.names
     assert "resumed" in rig.names
 
 
+@pytest.mark.long
 @pytest.mark.promise("P03")
 def test_level_rules_see_a_press_that_grows_slowly():
     """Events come in steps of a tenth of the level: from 2 N, 0.81, to 200 N, 0.91, there is none."""

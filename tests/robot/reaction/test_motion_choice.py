@@ -109,6 +109,7 @@ def test_half_a_push_is_half_the_speed_and_it_comes_up_as_the_damping_says():
     assert all(b - a < 0.05 * CYCLE / _DAMPING_TIME * 1.5 for a, b in pairwise(speeds))
 
 
+@pytest.mark.long
 @given(st.lists(st.floats(0.0, 1.0), min_size=20, max_size=20))
 @settings(max_examples=12)
 def test_however_it_is_pushed_it_moves_away_and_no_farther_than_allowed(levels):

@@ -49,6 +49,7 @@ def states(draw: st.DrawFn) -> tuple[ArmModel, Joints, Joints, list[ContactOnLin
     return arm, six(angles), six(speeds), contacts, reaction
 
 
+@pytest.mark.long
 @pytest.mark.promise("P33")
 @settings(max_examples=100)
 @given(states(), st.floats(0.0, 1.9))
@@ -111,6 +112,7 @@ def test_the_way_made_while_braking_is_made_good() -> None:
     assert follow(UR10E, plan, six(on)).made == pytest.approx(0.05, abs=1e-3)
 
 
+@pytest.mark.long
 def test_retreats_from_anywhere_end_where_they_should() -> None:
     """python -m bench retreat prints the same over more runs, with the spread of the drift."""
     source = random.Random(5)

@@ -35,6 +35,7 @@ def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push(external):
     assert max(map(abs, rig.arm.qd)) < 0.01
 
 
+@pytest.mark.long
 def test_it_gives_way_no_farther_than_its_distance():
     rig = GuardRig(touch(0.5), reaction=comply(), speed=1.0).run(1.9)
     assert rig.core.phase is Phase.LATCHED
