@@ -3,7 +3,8 @@
     python -m bench design-reach FOLDER               # every STL, DAE and OBJ in it, three sheets at most
     python -m bench design-reach FOLDER --keep FILE   # goes on where it ended
 
-What became of each: the share of the hull's area that the sheets cover, or the last line of what the command said. A
+What became of each: the share of the hull's area that the sheets cover, and on which they locate a touch; or the last
+line of what the command said. A
 mesh is one of a maker's description, whatever part of the arm it is: bases, forks and flat wrists are among them.
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -40,8 +42,9 @@ def design(mesh: Path, seconds: float) -> dict[str, object]:
         said = done.stderr.strip().splitlines()
         return {**row, "traceback": "Traceback" in done.stderr, "words": said[-1] if said else ""}
     found = json.loads(done.stdout)
-    share = sum(sheet["fit"]["area_share"] for sheet in found["sheets"])
-    return {**row, "sheets": len(found["sheets"]), "share": round(share, 3)}
+    covered = sum(sheet["fit"]["area_share"] for sheet in found["sheets"])
+    active = sum(sheet["fit"]["area_share"] * sheet["active_share"] for sheet in found["sheets"])
+    return {**row, "sheets": len(found["sheets"]), "share": round(covered, 3), "active": round(active, 3)}
 
 
 def main() -> None:
@@ -61,10 +64,13 @@ def main() -> None:
             with options.keep.open("a") as file:
                 file.write(json.dumps(row) + "\n")
     print(head("trimesh", "numpy", "scipy"))
-    print(f"{'mesh':90s}{'sheets':>7s}{'share':>7s}{'s':>7s}  what it said")
+    print(f"{'mesh':90s}{'sheets':>7s}{'share':>7s}{'active':>7s}{'s':>7s}  what it said")
     for name, row in sorted(rows.items()):
-        sheets, share = row.get("sheets", "-"), row.get("share", "-")
-        print(f"{name[-89:]:90s}{sheets:>7}{share:>7}{row['s']:>7}  {row.get('words', '')}")
+        sheets, share, active = (row.get(key, "-") for key in ("sheets", "share", "active"))
+        print(f"{name[-89:]:90s}{sheets:>7}{share:>7}{active:>7}{row['s']:>7}  {row.get('words', '')}")
+    shares = [float(str(row["active"])) for row in rows.values() if "active" in row]
+    if shares:
+        print(f"median active share of {len(shares)} designs: {statistics.median(shares):.3f}")
     codes = Counter(str(row["code"]) for row in rows.values())
     print(f"{len(rows)} meshes: " + ", ".join(f"exit {code}: {count}" for code, count in sorted(codes.items())))
     print(f"tracebacks: {sum(bool(row.get('traceback')) for row in rows.values())}")

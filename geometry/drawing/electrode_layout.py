@@ -17,7 +17,7 @@ hole: with three holes, a layer that is mirrored or turned does not fit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 from coneskin.core.errors import GeometryError
@@ -248,6 +248,32 @@ def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLay
         folds={name: fold(q) for name, q in zip(_SIDE_ELECTRODES[plan.wires], tab_q, strict=True)} if plan.tab else {},
         holes=tuple((at.u, at.phi) for at in holes if isinstance(at, ShapeCorner)) if plan.hole else (),
     )
+
+
+LEAST_ACTIVE_SHARE = 0.40  #: of a sheet; one of less costs four wires and feels touches hardly anywhere
+NARROWEST_PLAN = ElectrodePlan(2e-3, 3e-3, lead=3e-3, clearance=1e-3, hole=0.0)  #: as a knife and a hand still make it
+#: with holes, which show a layer that is turned or mirrored
+_PLANS = (ElectrodePlan(), ElectrodePlan(5e-3, 4e-3, lead=3e-3, clearance=1e-3, hole=2e-3))
+_HOLE_WORTH = 0.9  # of the active area of the narrowest plan: a wider one that leaves as much is taken, for its holes
+
+
+def best_layout(sheet: Frustum, plan: ElectrodePlan | None = None, wires: SheetSide = "end1") -> SheetLayout:
+    """Lay out a sheet with a given plan, or with the one that leaves most active; wider ones for their holes.
+
+    Raises:
+        GeometryError: no active area would remain, or tabs do not fit.
+    """
+    if plan is not None:
+        return lay_out_sheet(sheet, replace(plan, wires=wires))
+    narrowest = lay_out_sheet(sheet, replace(NARROWEST_PLAN, wires=wires))
+    for wider in _PLANS:
+        try:
+            layout = lay_out_sheet(sheet, replace(wider, wires=wires))
+        except GeometryError:
+            continue
+        if layout.active_share >= _HOLE_WORTH * narrowest.active_share:
+            return layout
+    return narrowest
 
 
 def _spread(sheet: Frustum, plan: ElectrodePlan, narrow: float) -> float:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from coneskin.core.errors import MeshError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
@@ -326,8 +327,13 @@ def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]
 
     Raises:
         GeometryError: the weights are not about this link.
-        MeshError: no face of the mesh is visible from outside.
+        MeshError: no face of the mesh is visible from outside, or it is no mesh.
     """
+    if not isinstance(mesh, Mesh):
+        raise MeshError(
+            f"the mesh must be a Mesh, got {mesh!r} of the type {type(mesh).__name__}: read a file first, as in "
+            "find_cones(load_mesh('link.stl'))"
+        )
     progress("sampling the hull")
     rays = RayCaster(mesh)
     hull = sample_surface(mesh, rays, _SEARCH_SAMPLES)

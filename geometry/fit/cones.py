@@ -12,10 +12,10 @@ import numpy as np
 from coneskin.geometry.mesh import Mesh
 
 from .axis_plan import AxisPlan, SheetRequirements
-from .bare_areas import BareArea, BareLength, bare_areas, bare_lengths, hull_note
+from .bare_areas import BareArea, bare_areas, hull_note
 from .candidates import SampledLink, sample_link
 from .coarse_packing import AxisSurvey, better_surveys, survey_axes
-from .fit_options import MOST_TOLERANCE, FitOptions
+from .fit_options import MOST_TOLERANCE, FitOptions, with_named
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import FineStage, SheetPlan, best_plan
 from .surface_samples import SurfaceSamples
@@ -28,13 +28,12 @@ _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
 
 @dataclass(frozen=True, slots=True)
 class LinkFit:
-    """Sheets found on a link, and the lengths that they leave bare.
+    """Sheets found on a link, and what they leave bare.
 
     Attributes:
         sheets: those about the axis that covers most first, in order along their axis; empty where nothing fits within
             the tolerance.
         nearest: where nothing fits, the sheet that comes nearest; None where a sheet fits.
-        bare: lengths without a sheet along the axis of the first sheet, in order.
         tolerance: largest distance allowed between sheet and hull [m].
         link_length: length of the link along the axis of the first sheet [m].
         hull_area: area visible from outside [m2].
@@ -48,7 +47,6 @@ class LinkFit:
 
     sheets: tuple[FittedSheet, ...]
     nearest: FittedSheet | None
-    bare: tuple[BareLength, ...]
     tolerance: float
     link_length: float
     hull_area: float
@@ -89,7 +87,7 @@ def find_cones(
         GeometryError: an option is out of range.
         MeshError: no face of the mesh is visible from outside.
     """
-    options = replace(options or FitOptions(), **named)
+    options = with_named(options, named)
     say = progress or (lambda _: None)
     return fit_cones(sample_link(mesh, options, say), options, say)
 
@@ -120,7 +118,6 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     fit = LinkFit(
         sheets=(),
         nearest=None,
-        bare=(),
         tolerance=tolerance,
         link_length=_longest(link.hull),
         hull_area=link.hull_area,
@@ -142,8 +139,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
             first = looser.axes[0]
             widest = max(first.sides, key=lambda side: side.area(first.profile))
             nearest = fitted_sheet(first, widest, 0, link.counted, needed, worth)
-        bare = (BareLength(0.0, length, reason),)
-        return replace(fit, nearest=nearest, needed_tolerance=needed, bare=bare, reason=reason)
+        return replace(fit, nearest=nearest, needed_tolerance=needed, reason=reason)
     first = plan.axes[0]
     further: AxisPlan | None = None
     if plan.count >= requirements.max_sheets:
@@ -156,7 +152,6 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
             for side in about.sides
         ),
         bare_areas=tuple(bare_areas(plan, further, surveys, link.hull, requirements)),
-        bare=tuple(bare_lengths(first.profile, first.sides, tolerance, options.min_length, further)),
         link_length=first.profile.step * len(first.profile.z),
     )
 

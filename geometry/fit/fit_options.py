@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +100,30 @@ class FitOptions:
         """Unit vector in which the seam of a full wrap faces, shape (3,)."""
         facing = np.asarray(self.seam_direction, float)
         return np.asarray(facing / np.linalg.norm(facing))
+
+
+def check_names(names: Iterable[str], more: tuple[str, ...] = ()) -> None:
+    """Refuse names that are no option of the search, nor one of ``more``.
+
+    Raises:
+        GeometryError: with the nearest name.
+    """
+    known = [*(item.name for item in fields(FitOptions)), *more]
+    for name in names:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1, 0.5)
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(known))}"
+            raise GeometryError(f"{name} is no option of the search for sheets; {hint}")
+
+
+def with_named(options: FitOptions | None, named: Mapping[str, Any]) -> FitOptions:
+    """Return options with those that are given by name.
+
+    Raises:
+        GeometryError: a name is unknown, or a value is out of range.
+    """
+    check_names(named)
+    return replace(options or FitOptions(), **named)
 
 
 def _check_count(name: str, value: int, least: int, most: int) -> None:

@@ -31,7 +31,8 @@ def test_the_file_as_it_is_written_changes_nothing(tmp_path: Path) -> None:
 def test_every_value_in_the_file_is_the_default_of_its_field(tmp_path: Path) -> None:
     text = re.sub(r"^#(?=\w+ = .)", "", settings_text(), flags=re.MULTILINE)
     settings = read_settings(written(tmp_path, text))
-    assert (settings.options, settings.files) == (DesignOptions(), FileOptions())
+    assert (settings.options, settings.files) == (DesignOptions(plan=ElectrodePlan()), FileOptions())
+    assert read_settings().options.plan is None, "without its table it is chosen for each sheet"
     search = dict(settings.search)
     assert search.pop("round_only") is False
     assert FitOptions(**search) == FitOptions()

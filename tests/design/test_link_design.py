@@ -9,6 +9,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 import coneskin as cs
+from coneskin.core.errors import GeometryError
 from coneskin.design import link_design
 from coneskin.design.link_design import NothingFits, design_link, load_link
 from coneskin.geometry.mesh import Mesh, make_mesh
@@ -131,3 +132,19 @@ def test_a_mesh_on_which_nothing_fits_is_refused_with_the_search(monkeypatch: py
     with pytest.raises(NothingFits, match="there is no sheet to design: it is a box") as caught:
         design_link("box.stl")
     assert (caught.value.source, caught.value.fit) == ("box.stl", fit)
+
+
+@pytest.mark.parametrize(
+    ("link", "named", "said"),
+    [
+        (cs.Frustum(0.05, 0.05, 0.2), {"foo": 1}, "foo is no option of the search for sheets; known are allow_hull, "),
+        (cs.Frustum(0.05, 0.05, 0.2), {"max_sheet": 1}, "did you mean max_sheets?"),
+        (cs.Frustum(54, 70, 150), {}, "radius1 must be at most 5 m, got 54 m: lengths are in meters, 54 mm is 0.054"),
+        ([cs.PlacedFrustum(cs.Frustum(0.05, 0.05, 200))], {}, "height must be at most 5 m, got 200 m"),
+        ([cs.Frustum(0.05, 0.05, 0.2)], {}, "a place must be a PlacedFrustum, got Frustum("),
+    ],
+)
+def test_what_no_link_can_be_is_refused(link: object, named: dict[str, object], said: str) -> None:
+    with pytest.raises(GeometryError) as raised:
+        cs.design_link(link, **named)  # type: ignore[arg-type]
+    assert said in str(raised.value)

@@ -35,7 +35,7 @@ def test_a_taper_below_the_noise_of_a_mesh_is_a_cylinder(taper: float, straight:
     """A fitted cylinder is never exact: its sector would have a radius of a kilometre and more."""
     found = PlacedFrustum(Frustum(0.054, 0.054 + taper, 0.2))
     sheet = FittedSheet(found, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0)
-    fit = LinkFit((sheet,), None, (), 1e-3, 0.2, 0.07, (), "", 1)
+    fit = LinkFit((sheet,), None, 1e-3, 0.2, 0.07, (), "", 1)
     (design,) = design_sheets(fit)
     side = design.place.frustum
     assert (side.radius1 == side.radius2 == pytest.approx(0.054 + 0.5 * taper)) == straight

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
-from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.fit.fit_options import FitOptions, with_named
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import RadialProfile
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
@@ -122,7 +122,6 @@ def with_developables(
         notes=(*cones.notes, note),
         sheets=tuple(best),
         nearest=None,
-        bare=(),
         reason="",
         needed_tolerance=tolerance,
         bare_areas=bare,
@@ -237,7 +236,7 @@ def find_sheets(
         GeometryError: an option is out of range.
         MeshError: no face of the mesh is visible from outside.
     """
-    options = replace(options or FitOptions(), **named)
+    options = with_named(options, named)
     say = progress or (lambda _: None)
     link = sample_link(mesh, options, say)
     cones = fit_cones(link, options, say)

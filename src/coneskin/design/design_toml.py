@@ -103,7 +103,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
         ),
     ),
     "electrodes": (
-        "Widths on the sheet.",
+        "Widths on the sheet. Without this table they are chosen for each sheet, so that most of it is active.",
         _fields(
             """
             margin_mm: inactive rim outside the electrodes
@@ -114,7 +114,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             tab_mm: length of the tabs beyond the rim, 0 for none
             hole_mm: diameter of the registration holes, 0 for none
             """,
-            _DEFAULT_OPTIONS.plan,
+            ElectrodePlan(),
             *(Key(f"{name}_mm", low=0.0) for name in ("margin", "electrode", "setback", "lead", "clearance")),
             *(Key(f"{name}_mm", low=0.0) for name in ("tab", "hole")),
         ),
@@ -301,7 +301,7 @@ def _settings(values: Mapping[str, Mapping[str, Any]]) -> _DesignSettings:
     fields = {"supply": "supply_volts", "adc": "adc_volts", "pulldown": "pulldown_ohms"}
     options = DesignOptions(
         stack=LayerStack((one, two, three, four, five), mode),
-        plan=ElectrodePlan(**values["electrodes"]),
+        plan=ElectrodePlan(**values["electrodes"]) if values["electrodes"] else None,
         electronics=GivenElectronics(**{fields.get(name, name): value for name, value in given.items()}),
         jig=JigPlan(**values["jig"]),
         snap=tolerance,

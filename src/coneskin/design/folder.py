@@ -258,7 +258,6 @@ def write_design(
         design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)
     ]
     if fit is not None:
-        data["bare"] = [{"start_mm": 1e3 * b.start, "end_mm": 1e3 * b.end, "reason": b.reason} for b in fit.bare]
         data["bare_areas"] = [{"share": round(b.share, 4), "reason": b.reason} for b in fit.bare_areas]
     cuts = [cut for design in sheets for cut in design.cuts]
     pieces = [make_test_piece(material) for material in dict.fromkeys(cut.material for cut in cuts)]

@@ -6,6 +6,7 @@ A link is a mesh file, or a link of a URDF.
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -13,8 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.geometry.drawing.electrode_layout import LEAST_ACTIVE_SHARE, NARROWEST_PLAN, best_layout
+from coneskin.geometry.fit.fit_options import check_names
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import Mesh, load_mesh
+from coneskin.geometry.mesh import MAX_LENGTH, Mesh, load_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
@@ -244,6 +247,45 @@ class LinkDesign:
         return html_card(f"design of {self.name}", rows, step, f"{style}<div class='coneskin-flat'>{drawn}</div>")
 
 
+def _worth_their_wires(fit: LinkFit) -> tuple[LinkFit, tuple[str, ...]]:
+    """Return a fit without the sheets of which too little would be active, and a note of each of those."""
+    kept, poor = [], []
+    for sheet in fit.sheets:
+        side = sheet.frustum
+        try:
+            share = best_layout(side).active_share
+        except GeometryError:
+            share = 0.0
+        if share >= LEAST_ACTIVE_SHARE:
+            kept.append(sheet)
+            continue
+        poor.append(
+            f"no sheet of {1e3 * side.slant:.1f} mm and {math.degrees(side.wrap):.0f} deg: rims and electrodes would "
+            f"leave {share:.0%} of it active, less than {LEAST_ACTIVE_SHARE:.0%}; give the widths (electrodes) to "
+            "design it all the same"
+        )
+    if not kept:
+        raise GeometryError("there is no sheet to design: " + "; ".join(poor))
+    return dataclasses.replace(fit, sheets=tuple(kept)), tuple(poor)
+
+
+def _check_size(place: PlacedFrustum) -> None:
+    """Refuse a side that is larger than any link, as where millimeters were meant.
+
+    Raises:
+        GeometryError: it is, or it is no side.
+    """
+    if not isinstance(place, PlacedFrustum):
+        raise GeometryError(f"a place must be a PlacedFrustum, got {place!r}: give the pose of each Frustum")
+    for name in ("radius1", "radius2", "height"):
+        value = getattr(place.frustum, name)
+        if value > MAX_LENGTH:
+            raise GeometryError(
+                f"{name} must be at most {MAX_LENGTH:g} m, got {value:g} m: lengths are in meters, "
+                f"{value:g} mm is {1e-3 * value:g}"
+            )
+
+
 def design_link(
     link: str | Path | Mesh | Frustum | Sequence[PlacedFrustum],
     folder: str | Path | None = None,
@@ -293,12 +335,14 @@ def design_link(
         progress(step)
 
     options = options or DesignOptions()
+    check_names(search, ("round_only",))
+    plan = options.plan or NARROWEST_PLAN
     # neighbours about other axes need room for the sheets of these options
     search = {
         "thickness": options.stack.thickness,
         "gap": options.sheet_gap,
-        "min_radius": 2.0 * options.plan.lead,
-        "min_arc": options.plan.least_arc,
+        "min_radius": 2.0 * plan.lead,
+        "min_arc": plan.least_arc,
         **search,
     }
     source: LinkMesh | None = None
@@ -314,6 +358,9 @@ def design_link(
         places = fit
     else:
         places = link
+    if isinstance(places, Sequence):
+        for place in places:
+            _check_size(place)
     if source is not None:
         if fit is not None and not fit.sheets:
             raise NothingFits(source.mesh.source, fit)
@@ -323,6 +370,12 @@ def design_link(
             progress(f"note: {note}")
     if source is not None and not options.link:
         options = dataclasses.replace(options, link=source.name)
+    if fit is not None and options.plan is None:
+        places, poor = _worth_their_wires(fit)
+        notes = (*notes, *poor)
+        for note in poor:
+            progress(f"note: {note}")
+        fit = places
     sheets = cover_seams(design_sheets(places, options))
     mesh = None if source is None else source.mesh
     data: dict[str, Any] = {}

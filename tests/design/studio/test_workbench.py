@@ -119,7 +119,7 @@ def bench() -> Workbench:
     mesh = placed(revolve([(0.0, 0.030), (0.02, 0.040), (0.18, 0.055), (0.20, 0.03)], 96, 4), Pose())
     side = PlacedFrustum(Frustum(0.040, 0.055, 0.16), Pose(translation=(0.0, 0.0, 0.02)))
     sheet = FittedSheet(side, 2e-4, 1e-4, 0.0, 0.0, 0.8, 0.8, 0.0)
-    fit = LinkFit((sheet,), None, (), 1e-3, 0.2, 0.05, (), "", 1)
+    fit = LinkFit((sheet,), None, 1e-3, 0.2, 0.05, (), "", 1)
     made = Workbench(LinkMesh("a <link>", mesh, "its own", ("a <note>",)), fit, DesignOptions(link="a link"))
     made.handles = [Handles()]
     made.update()

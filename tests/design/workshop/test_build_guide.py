@@ -179,7 +179,7 @@ def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
 
 
 def test_the_bill_counts_every_sheet() -> None:
-    designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
+    designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15), DesignOptions(plan=ElectrodePlan()))
     figures = [measure_build(design, index) for index, design in enumerate(designs)]
     bill = {item.item: item.quantity for item in bill_of_materials(designs, figures)}
     assert bill["4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts"] == "2"
@@ -220,7 +220,7 @@ def test_a_sheet_beyond_whose_edge_something_stands_out_is_placed_by_a_straight_
 
 def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:
     """A short sheet: what lies beside its active area carries most of the current, and the guide says so."""
-    design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)))
+    design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)), plan=ElectrodePlan())
     text = guide(design, figures, "sheet-2")
     assert "Write the measured sheets into `sheet-2/sensor.toml`" in text
     ab, cd = figures.pairs

@@ -44,7 +44,7 @@ def test_the_seam_is_a_unit_vector_of_any_direction_but_none() -> None:
 def test_too_loose_a_tolerance_and_an_unknown_name_are_refused() -> None:
     with pytest.raises(GeometryError, match="tolerance must be at most 20 mm, got 21 mm"):
         FitOptions(tolerance=0.021)
-    with pytest.raises(TypeError, match="max_sheet"):
+    with pytest.raises(GeometryError, match="did you mean max_sheets"):
         find_cones(placed(frustum(0.05, 0.05, 0.2)), max_sheet=2)
 
 

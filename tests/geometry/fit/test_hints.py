@@ -68,8 +68,8 @@ def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
     mesh = BODIES[name]()
     fit = cones(mesh, max_sheets=1)
     for count in range(2, 6):
-        hints, lengths = asked_for(fit), [bare for bare in fit.bare if "raise the number" in bare.reason]
-        if not hints and not lengths:
+        hints = asked_for(fit)
+        if not hints:
             break
         assert hints in ([], [count])
         more = cones(mesh, max_sheets=count, max_wires=4 * count)
@@ -79,7 +79,6 @@ def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
     again = cones(mesh, max_sheets=len(fit.sheets) + 1)
     if len(again.sheets) < len(fit.sheets) + 1:
         assert asked_for(again) == [], "as many sheets were allowed already"
-        assert not any("raise the number" in bare.reason for bare in again.bare)
 
 
 @pytest.mark.long

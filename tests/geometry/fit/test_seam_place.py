@@ -107,7 +107,7 @@ def test_the_seam_of_a_stadium_lies_on_a_flat_of_it() -> None:
     radius = around / math.tau
     side = Developable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
     assert tube.distances(side.place(0.1, np.linspace(0.0, math.tau, 90))[0]).max() < 1e-6
-    before = LinkFit((FittedSheet(side, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, (), 1e-3, 0.2, 0.05, (), "", 1)
+    before = LinkFit((FittedSheet(side, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, 1e-3, 0.2, 0.05, (), "", 1)
     after, (place,) = place_seams(before, tube.mesh())
     seam = after.sheets[0].placed
     one, two = (seam.normal(math.radians(angle)) for angle in (-14.0, 14.0))

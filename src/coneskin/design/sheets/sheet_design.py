@@ -17,6 +17,7 @@ from coneskin.geometry.drawing.electrode_layout import (
     ElectrodePlan,
     ResolutionForecast,
     SheetLayout,
+    best_layout,
     forecast_resolution,
     lay_out_sheet,
 )
@@ -123,7 +124,7 @@ class DesignOptions:
 
     Attributes:
         stack: the five layers.
-        plan: electrodes, tabs, holes.
+        plan: electrodes, tabs, holes, for all sheets; None to choose those that leave most of each sheet active.
         wires: side where the wires leave, for all sheets; None for end 1, but end 2 of the last of several on one axis:
             tabs do not run into the neighbour.
         electronics: as far as they are fixed; the rest is chosen to match each sheet (``match_electronics``).
@@ -143,7 +144,7 @@ class DesignOptions:
     """
 
     stack: LayerStack = PAPER_STACK
-    plan: ElectrodePlan = field(default_factory=ElectrodePlan)
+    plan: ElectrodePlan | None = None
     wires: SheetSide | None = None
     electronics: GivenElectronics = field(default_factory=GivenElectronics)
     upper_sheet_ohms: float | None = None
@@ -259,7 +260,7 @@ def design_sheets(
             place = _seam_opened(_trimmed(link, cuts[i], cuts[i + 1]), options.seam_gap)
             before, after = (i > 0 and joints[i - 1]), (i < len(joints) and joints[i])
             auto: SheetSide = "end2" if before and not after else "end1"
-            layout = lay_out_sheet(place.frustum, replace(options.plan, wires=options.wires or auto))
+            layout = best_layout(place.frustum, options.plan, options.wires or auto)
             active = _active(place, layout, options.stack)
             squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
             conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
@@ -399,9 +400,8 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
     strips: list[SheetDesign] = []
     for design in designs:
         if design.options.cover_seam and design.place.frustum.wrap > _SEAM_TURN_SHARE * math.tau:
-            options = replace(
-                design.options, wires=design.layout.plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False
-            )
+            plan = design.layout.plan
+            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False)
             number = len(designs) + len(strips) + 1
             place, offset = _strip_place(design)
             (strip,) = design_sheets([place], options, number)

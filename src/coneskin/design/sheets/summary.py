@@ -9,7 +9,12 @@ from typing import Any
 
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutSheet
-from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, SurfaceRectangle, lay_out_sheet
+from coneskin.geometry.drawing.electrode_layout import (
+    LEAST_ACTIVE_SHARE,
+    ElectrodePlan,
+    SurfaceRectangle,
+    lay_out_sheet,
+)
 from coneskin.geometry.drawing.touch_marks import touch_marks
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -255,9 +260,6 @@ def polar_text(flat: Sector) -> str:
         f"r1 {flat.r1:.3f} m, r2 {flat.r2:.3f} m, {theta}: the arcs rise by {rises[0] * 1e3:.3f} and "
         f"{rises[1] * 1e3:.3f} mm"
     )
-
-
-LEAST_ACTIVE_SHARE = 0.30  #: of a sheet; where less is active, it costs four wires and feels touches hardly anywhere
 
 
 def small_active_area(design: SheetDesign) -> str:
