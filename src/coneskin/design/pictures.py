@@ -15,7 +15,7 @@ from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
 from .link_picture import draw_jig, draw_link, draw_weights
-from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
+from .sheet_pictures import draw_layout, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
 
@@ -35,7 +35,7 @@ def draw_pictures(
     bare: Sequence[BareArea] = (),
     weights: TouchWeights | None = None,
 ) -> list[tuple[str, str]]:
-    """Draw the link with its sheets, and of each sheet its layout, parts, stack and seam, and the map of deviations.
+    """Draw the link with its sheets, and of each sheet its layout, its stack, and the map of deviations.
 
     Args:
         folder: output folder; the pictures go into its pictures/.
@@ -89,15 +89,11 @@ def draw_pictures(
         progress(f"{design.name}: drawing how it is built")
         caption = f"{title}: its seven parts in the order of assembly, each seen from outside."
         picture(f"{name}-stack", (9, 7), caption, draw_stack, design)
-        where = "seam" if design.has_seam else "two edges, which do not meet"
-        picture(f"{name}-seam", (9, 4.5), f"{title}: section across its {where}.", draw_seam, design, item)
-        caption = f"{title}: its parts as they are cut, dimensions in mm."
-        picture(f"{name}-parts", (9, 11), caption, draw_parts, design)
         if item.collars:
             progress(f"{design.name}: drawing the jig")
             caption = f"{title}: parts of its jig as they are printed, a little apart."
             picture(f"{name}-jig", (10, 4.5), caption, draw_jig, item.collars)
-        if mesh is not None and not design.above:
+        if mesh is not None:
             progress(f"{design.name}: measuring deviations")
             caption = (
                 f"{title}: height of the mesh above the {design.place.kind}. Grey: holes and grooves deeper than the "

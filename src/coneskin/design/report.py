@@ -177,7 +177,8 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         yield "* The tabs run into the next sheet there: bend them up, or choose another side for the wires."
     yield (
         f"* Active area: u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to "
-        f"{patch['phi2_deg']:.2f} deg of the sheet: {share}."
+        f"{patch['phi2_deg']:.2f} deg of the sheet: {share}. Around the link no touch is located over "
+        f"{360.0 - patch['phi2_deg'] + patch['phi1_deg']:.1f} deg."
     )
     yield (
         f"* The decoder uses radius {active.radius1 * 1e3:.3f} to {active.radius2 * 1e3:.3f} mm, slant "

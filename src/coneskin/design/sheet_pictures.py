@@ -1,7 +1,6 @@
 """Pictures of one sheet for the report, with the dimensions that a ruler measures.
 
-They show its flat layout, its parts as they are cut, its parts pulled apart in their order, and a section through its
-seam.
+They show its flat layout, and its parts pulled apart in their order.
 """
 
 from __future__ import annotations
@@ -9,14 +8,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
+from coneskin.geometry.drawing.cut_sheet import CutSheet
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.sector import unroll
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text
-from .workshop.build_figures import WIRE_COLOURS, BuildFigures, CableExit, side_name
+from .workshop.build_figures import WIRE_COLOURS, CableExit
 
 INK_COLOUR = "#222222"
 FOIL_COLOUR = "#c27c0e"
@@ -153,57 +152,6 @@ def _electrode_names(design: SheetDesign, cut: CutSheet) -> list[tuple[str, floa
     return found
 
 
-def draw_parts(figure: Any, design: SheetDesign) -> None:
-    """Draw all seven cut sheets of a sensor with their dimensions in mm.
-
-    Args:
-        figure: an empty figure of matplotlib.
-        design: the sheet.
-    """
-    grid = figure.subplots(4, 2)
-    for axes, cut in zip(grid.flat, design.cuts, strict=False):
-        for part in cut.parts:
-            for stroke in part.strokes:
-                colour = tuple(value / 255.0 for value in LINE_COLOURS[stroke.kind])
-                axes.plot(*_xy(stroke.outline, 1e-4), color=colour, lw=0.7)
-        for name, x, y in _electrode_names(design, cut):
-            axes.text(x, y, name, fontsize=7, ha="center", va="center", bbox=_NAME_BOX)
-        x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
-        off = 0.05 * max(x1 - x0, y1 - y0)
-        arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
-        text = {"textcoords": "offset points", "fontsize": 7, "color": INK_COLOUR}
-        axes.annotate("", (x0, y0 - off), (x1, y0 - off), arrowprops=arrow)
-        middle = (0.5 * (x0 + x1), y0 - off)
-        axes.annotate(f"{x1 - x0:.2f}", middle, xytext=(0, -2), ha="center", va="top", **text)
-        axes.annotate("", (x1 + off, y0), (x1 + off, y1), arrowprops=arrow)
-        middle = (x1 + off, 0.5 * (y0 + y1))
-        axes.annotate(f"{y1 - y0:.2f}", middle, xytext=(3, 0), ha="left", va="center", rotation=90, **text)
-        sector = unroll(cut.surface)
-        lines = f"{cut.number} {cut.name}, {cut.face} up\nslant {1e3 * sector.slant:.2f}, arcs "
-        lines += f"{1e3 * sector.arc1:.2f} (end 1), {1e3 * sector.arc2:.2f} (end 2)"
-        lines += f"\n{polar_text(sector)}"
-        axes.set_title(lines, fontsize=7)
-        axes.plot([x0 - off, x1 + 2 * off], [y0 - 2 * off, y1 + off], lw=0)  # arrows do not extend the axes
-        axes.set_aspect("equal")
-        axes.axis("off")
-    plan = design.layout.plan
-    axes = grid.flat[7]
-    axes.axis("off")
-    holes = [
-        f"hole {n}: u {1e3 * u:.2f} mm, phi {math.degrees(phi):.3f} deg"
-        for n, (u, phi) in enumerate(design.layout.holes, 1)
-    ]
-    words = [
-        "all dimensions in mm, at the neutral surface",
-        "red cut, magenta hole, blue mark, green fold",
-        f"holes of {1e3 * plan.hole:g} mm" if holes else "no holes",
-        *holes,
-        f"electrodes {1e3 * plan.electrode:g} mm, margin {1e3 * plan.margin:g} mm",
-        f"tabs {1e3 * plan.lead:g} x {1e3 * plan.tab:g} mm at {side_name(plan.wires)}",
-    ]
-    axes.text(0.0, 0.95, "\n".join(words), va="top", fontsize=8, transform=axes.transAxes)
-
-
 _PART_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards
 _FACE_COLORS = ("#e8d9c0", "#55585e", FOIL_COLOUR, "#cfe3f1", FOIL_COLOUR, "#55585e", "#e8d9c0")
 
@@ -257,96 +205,3 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     axes.margins(0.04)
     axes.set_aspect("equal")
     axes.axis("off")
-
-
-def draw_seam(figure: Any, design: SheetDesign, figures: BuildFigures) -> None:
-    """Draw a section across the edges of a sheet, thickness enlarged, as it is seen from end 1.
-
-    Args:
-        figure: an empty figure of matplotlib.
-        design: the sheet.
-        figures: for building it.
-    """
-    axes = figure.add_subplot()
-    layout, stack, plan = design.layout, design.options.stack, design.layout.plan
-    side = design.place.frustum
-    u = 0.5 * side.slant
-    radius = side.radius_at(u)
-    reach = 2.6 * (plan.margin + plan.electrode) * 1e3
-    scale = 0.28 * reach / (stack.thickness * 1e3)  # how much thickness is enlarged
-    open_gap = (2.0 * math.pi - side.wrap) * radius * 1e3
-    shown_gap = min(open_gap, 0.5 * reach)
-    heights = [stack.face_offset(i) * 1e3 * scale for i in range(6)]
-    colours = ("#e8d9c0", "#55585e", "#cfe3f1", "#55585e", "#e8d9c0")
-    axes.fill_between([-reach - shown_gap, reach], -0.12 * reach, 0.0, color="#c4c8ce")
-    axes.text(-0.5 * shown_gap, -0.06 * reach, "link", ha="center", va="center", fontsize=9)
-    arc = 1e3 * radius
-    whole = (0.0, 0.0)
-    lower, upper = (_insets(shape, layout.sheet.wrap, u, arc) for shape in (layout.lower, layout.upper))
-    spans = (whole, lower, whole, upper, whole)  # from edge 0 and from the other edge inwards [mm]
-    for index in range(5):
-        first, last = spans[index]
-        low, high = heights[index], heights[index + 1]
-        high = max(high, low + 0.02 * reach)  # a thin sheet stays visible
-        for span in ([first, reach], [-reach - shown_gap, -shown_gap - last]):
-            axes.fill_between(span, low, high, facecolor=colours[index], edgecolor=INK_COLOUR, lw=0.5)
-        at = 0.5 * (low + high) + {1: -0.02, 3: 0.02}.get(index, 0.0) * reach  # names of thin layers beside each other
-        layer = stack.layers[index]
-        axes.text(reach * 1.03, at, f"{layer.name}, {layer.thickness * 1e3:g} mm", fontsize=8, va="center")
-    turn = plan.electrode / min(side.radius1, side.radius2)
-    margin, width = (layout.field.phi1 - turn) * arc, turn * arc
-    thick = 0.012 * reach
-    foils = [("D", margin, width, 1.0), ("C", -shown_gap - margin - width, width, 1.0)]
-    if plan.wires.startswith("end"):  # of the electrode at the other end, on its way to the wires
-        foils.append((f"lead of {plan.led_across}", *_lead(layout, arc), -1.0))
-    for name, start, wide, way in foils:  # on the faces of the conductive sheets, towards each other
-        face, beyond = (heights[2], heights[1]) if way > 0.0 else (heights[3], heights[4])
-        axes.fill_between([start, start + wide], face, face + way * thick, color=FOIL_COLOUR)
-        style = {"ha": "center", "va": "center", "fontsize": 9, "fontweight": "bold"}
-        axes.text(start + 0.5 * wide, beyond - 0.04 * way * reach, name, **style)
-    top = heights[5]
-    if design.options.overlap:
-        flap = 1e3 * design.options.overlap
-        axes.plot([-shown_gap, flap], [top + 0.03 * reach] * 2, color="#a07840", lw=3)
-        axes.text(0.5 * flap, top + 0.05 * reach, f"flap {flap:g} mm", ha="center", fontsize=8)
-    blind1, blind2 = layout.active.phi1 * arc, (side.wrap - layout.active.phi2) * arc
-    y = top + 0.14 * reach
-    axes.plot([0.0], [y + 0.1 * reach], lw=0)  # arrows and text do not extend the axes
-    arrow = {"arrowstyle": "<->", "color": "#b00020", "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (-shown_gap - blind2, y), (blind1, y), arrowprops=arrow)
-    blind = blind1 + blind2 + open_gap
-    axes.text(
-        0.5 * (blind1 - shown_gap - blind2),
-        y + 0.02 * reach,
-        f"no touch is located here: {blind:.1f} mm, {math.degrees(blind / arc):.1f} deg",
-        ha="center",
-        fontsize=9,
-        color="#b00020",
-    )
-    for x, text in ((0.6 * reach, "edge 0 (phi = 0)"), (-0.6 * reach - shown_gap, "edge of C (phi = wrap)")):
-        axes.text(x, -0.16 * reach, text, ha="center", va="top", fontsize=9)
-    note = f"seen from end 1, at the middle of the slant; thickness enlarged {scale:.1f} times"
-    if open_gap > shown_gap:
-        note += f"; {open_gap:.0f} mm of the link between the edges are left out"
-    cable = f"setback {1e3 * plan.setback:g} mm, wires leave at {side_name(figures.cable.side)}"
-    what = "its two edges, between which the link is bare" if not design.has_seam else "the seam"
-    axes.set_title(f"{design.name}: section of {what}\n{note}; {cable}", fontsize=9)
-    axes.axis("off")
-
-
-def _insets(shape: Any, wrap: float, u: float, arc: float) -> tuple[float, float]:
-    """Return how far a conductive sheet ends before edge 0 and before the other edge at a slant distance [mm]."""
-    corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
-    at = [
-        a.phi
-        for a, b in zip(corners, corners[1:] + corners[:1], strict=True)
-        if min(a.u, b.u) <= u < max(a.u, b.u) and abs(a.phi - b.phi) < 1e-12
-    ]
-    return min(at) * arc, (wrap - max(at)) * arc
-
-
-def _lead(layout: Any, arc: float) -> tuple[float, float]:
-    """Return where the lead along edge 0 begins, and its width [mm]."""
-    foil = layout.foils[layout.plan.led_across]
-    start, end, *_ = sorted({round(corner.phi, 9) for corner in foil if isinstance(corner, ShapeCorner)})
-    return start * arc, (end - start) * arc
