@@ -25,7 +25,7 @@ from scipy.spatial import KDTree
 
 import coneskin as cs
 from bench.report import head
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, _blind_angle, cover_seams, design_sheets
 from coneskin.design.workshop.jig import Collar, _with_sheets, jig_collars
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.frustum import Frustum
@@ -82,11 +82,12 @@ def _finished(text: str) -> dict[str, list[str]]:
 
 def seams() -> None:
     narrow = ElectrodePlan(margin=4e-3, electrode=3e-3, lead=3e-3, clearance=1e-3, hole=0.0)
-    rows = {"default": DesignOptions(plan=ElectrodePlan()), "narrow electrodes": DesignOptions(plan=narrow)}
-    rows |= {"flap of 10 mm": DesignOptions(plan=ElectrodePlan(), overlap=10e-3)}
+    rows = {"default": DesignOptions(), "narrow electrodes": DesignOptions(plan=narrow)}
+    rows |= {"flap of 10 mm": DesignOptions(overlap=10e-3), "strip": DesignOptions(cover_seam=True)}
+    rows["strip, narrow"] = DesignOptions(plan=narrow, cover_seam=True)
     for radius in (0.0375, 0.054, 0.075):
         for name, options in rows.items():
-            sheets = design_sheets([PlacedFrustum(Frustum(radius, radius, 0.2))], options)
+            sheets = cover_seams(design_sheets([PlacedFrustum(Frustum(radius, radius, 0.2))], options))
             print(f"  radius {1e3 * radius:5.1f} mm  {name:18} {math.degrees(_blind(sheets)):6.2f}")
 
 
@@ -100,7 +101,7 @@ def _blind(sheets: tuple[SheetDesign, ...], steps: int = 36_000) -> float:
         local = (phi - math.atan2(y, x)) % (2.0 * math.pi)
         box = sheet.layout.active
         seen |= (local >= box.phi1 - 1e-9) & (local <= box.phi2 + 1e-9)
-    assert len(sheets) > 1 or abs(float(seen.mean()) * 2.0 * math.pi - (box.phi2 - box.phi1)) < 1e-3
+    assert len(sheets) > 1 or abs(float((~seen).mean()) * 2.0 * math.pi - _blind_angle(sheets[0])) < 1e-3
     return float((~seen).mean()) * 2.0 * math.pi
 
 

@@ -195,6 +195,11 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
         (CYLINDER, "sheet.overlap_mm=5; sheet.wires=edge1", "an overlap at edge1 would cover the tabs"),
         (CYLINDER, "search.touch_side=[1, 0, 0]", "search.touch_side is for a mesh"),
         (
+            [*CYLINDER, "--wrap-deg", "180"],
+            "sheet.cover_seam=true",
+            "no sheet has a seam to cover: the widest wraps 180 deg",
+        ),
+        (
             CYLINDER,
             "drawings.bed_mm=[1e-9, 1e-9]",
             "bed_mm[0] must be from 50 to 10000 mm, got 1e-09 mm",

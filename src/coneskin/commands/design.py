@@ -248,6 +248,8 @@ def _print(found: LinkDesign) -> None:
                     f", but {design.fit.bridged_share:.1%} of it spans holes and grooves, down to "
                     f"{design.fit.bridged_depth * 1e3:.2f} mm"
                 )
+        if design.above:
+            line += f", over the seam of {design.above}"
         print(line)
         parts, (upper, lower) = design.electronics, design.conductive
         print(

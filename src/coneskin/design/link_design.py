@@ -22,7 +22,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
 from .folder import FileOptions, check_target, write_design
-from .sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from .sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_sheets
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -376,7 +376,7 @@ def design_link(
         for note in poor:
             progress(f"note: {note}")
         fit = places
-    sheets = design_sheets(places, options)
+    sheets = cover_seams(design_sheets(places, options))
     mesh = None if source is None else source.mesh
     data: dict[str, Any] = {}
     if folder is not None:

@@ -93,7 +93,7 @@ def draw_pictures(
             progress(f"{design.name}: drawing the jig")
             caption = f"{title}: parts of its jig as they are printed, a little apart."
             picture(f"{name}-jig", (10, 4.5), caption, draw_jig, item.collars)
-        if mesh is not None:
+        if mesh is not None and not design.above:
             progress(f"{design.name}: measuring deviations")
             caption = (
                 f"{title}: height of the mesh above the {design.place.kind}. Grey: holes and grooves deeper than the "

@@ -1,4 +1,7 @@
-"""Design of sheets from their places on a link: trimmed, laid out, and drawn for every layer."""
+"""Design of sheets from their places on a link: trimmed, laid out, and drawn for every layer.
+
+A strip over the blind seam of a full wrap is a sheet of its own, on top of the one below.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from coneskin.geometry.drawing.electrode_layout import (
     SheetLayout,
     best_layout,
     forecast_resolution,
+    lay_out_sheet,
 )
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.surface_shape import SheetSide
@@ -129,6 +133,7 @@ class DesignOptions:
         lower_sheet_ohms: the same of the lower conductive layer.
         seam_gap: gap of the seam of a full wrap, at the narrow end of the innermost face.
         overlap: width of a flap on the upper substrate that closes the seam.
+        cover_seam: True for a strip over the seam of each full wrap, a sensor of its own that closes it.
         sheet_gap: smallest distance between neighbouring sheets along the axis.
         kerf: width of the cut.
         snap: a pattern is cut as a rectangle if that moves no cut by more.
@@ -146,6 +151,7 @@ class DesignOptions:
     lower_sheet_ohms: float | None = None
     seam_gap: float = 0.0
     overlap: float = 0.0
+    cover_seam: bool = False
     sheet_gap: float = 1e-3
     kerf: float = 0.0
     snap: float = 1e-5
@@ -171,6 +177,8 @@ class SheetDesign:
         electronics: those given, and those that match.
         next_joint: joint with the next sheet; None for the last one.
         fit: fit of the place to the mesh; None for a link given by its dimensions.
+        above: name of the sheet on which it lies, where it is a strip over the seam of that.
+        seam_offset: angle from edge 0 of such a strip to the middle of the seam below it [rad].
     """
 
     name: str
@@ -183,6 +191,8 @@ class SheetDesign:
     electronics: Electronics
     next_joint: _SheetJoint | None = None
     fit: FittedSheet | None = None
+    above: str = ""
+    seam_offset: float = 0.0
 
     def __repr__(self) -> str:
         return f"<SheetDesign {self.name!r}: {self.dimensions}>"
@@ -361,3 +371,68 @@ def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> Pla
     box = layout.field
     phi1, phi2 = (place.azimuth_above(height, phi) for phi in (box.phi1, box.phi2))
     return place.parallel(height).part(box.u1, box.u2, phi1, phi2)
+
+
+_SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
+
+
+def _blind_angle(design: SheetDesign) -> float:
+    """Return the angle about the axis in which a sheet locates no touch: its seam, and what it does not wrap [rad]."""
+    return math.tau - (design.layout.active.phi2 - design.layout.active.phi1)
+
+
+def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
+    """Add a strip over the seam of every full wrap, where the options ask for it.
+
+    A strip is a sensor of its own, with four wires that leave on the same side. It is glued on the outer face of its
+    sheet; its electrodes D and C stand exactly where the active area of that sheet ends and begins.
+
+    Args:
+        designs: sheets, as ``design_sheets`` makes them.
+
+    Returns:
+        the sheets, followed by their strips.
+
+    Raises:
+        GeometryError: no sheet wraps a whole turn; a strip would meet itself on the other side of its sheet, or cannot
+            be made.
+    """
+    strips: list[SheetDesign] = []
+    for design in designs:
+        if design.options.cover_seam and design.place.frustum.wrap > _SEAM_TURN_SHARE * math.tau:
+            plan = design.layout.plan
+            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False)
+            number = len(designs) + len(strips) + 1
+            place, offset = _strip_place(design)
+            (strip,) = design_sheets([place], options, number)
+            strips.append(replace(strip, above=design.name, seam_offset=offset))
+    if not strips and any(design.options.cover_seam for design in designs):
+        widest = max(design.place.frustum.wrap for design in designs)
+        raise GeometryError(
+            f"no sheet has a seam to cover: the widest wraps {math.degrees(widest):.0f} deg, and a seam needs at least "
+            f"{math.degrees(_SEAM_TURN_SHARE * math.tau):.0f}; leave the covered seam out"
+        )
+    return (*designs, *strips)
+
+
+def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
+    """Return the side that the strip of a sheet covers, and the angle from its edge 0 to the middle of the seam."""
+    stack, side = design.options.stack, design.place.frustum
+    plan = design.layout.plan
+    if plan.wires.startswith("edge"):
+        raise GeometryError(
+            f"{design.name}: its wires leave at the seam, where its strip lies: let them leave at an end"
+        )
+    above = design.place.parallel(stack.thickness)
+    outer = above.frustum
+    trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * math.tau)
+    inside = lay_out_sheet(trial, plan).active
+    before, after = inside.phi1, trial.wrap - inside.phi2
+    wrap = before + _blind_angle(design) + after
+    if wrap > 0.5 * math.tau:
+        raise GeometryError(
+            f"{design.name}: a strip over its seam would have to wrap {math.degrees(wrap):.0f} deg, at most 180: make "
+            "electrodes and margins narrower"
+        )
+    start = design.layout.active.phi2 - before
+    return above.part(0.0, outer.slant, start, start + wrap), 0.5 * (side.wrap + math.tau) - start

@@ -68,6 +68,8 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
             for step in design.forecasts()
         ],
     }
+    if design.above:
+        data["above"] = design.above
     if design.next_joint is not None:
         joint = design.next_joint
         data["gap_to_next_mm"] = {"inner": _round(1e3 * joint.inner), "outer": _round(1e3 * joint.outer)}
@@ -261,9 +263,12 @@ def polar_text(flat: Sector) -> str:
 
 
 def small_active_area(design: SheetDesign) -> str:
-    """Return how little of a sheet is active, and what would leave more; empty where it is enough."""
+    """Return a sentence that says how little of a sheet is active, and what would leave more; empty where it is enough.
+
+    The strip over a seam is meant to be narrow, and nothing is said of it.
+    """
     layout, side = design.layout, design.layout.sheet
-    if layout.active_share >= LEAST_ACTIVE_SHARE:
+    if design.above or layout.active_share >= LEAST_ACTIVE_SHARE:
         return ""
     active = layout.active
     text = (

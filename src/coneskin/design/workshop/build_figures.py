@@ -323,7 +323,7 @@ def measure_build(
         _cable_exit(design.layout, design.options.connector),
         _pair_readings(design),
         _expected_frame(design, index, frame),
-        find_placement(design.place, mesh, faces),
+        find_placement(design.place, mesh, () if design.above else faces),
         *jig_collars(design, mesh, others),
     )
 

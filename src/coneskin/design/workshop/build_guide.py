@@ -121,9 +121,11 @@ def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the steps from the clean link to the sheet that holds on it."""
     stack, options = design.options.stack, design.options
     marks = "the blue outline on part 1"
+    ground = f"the outside of {design.above}" if design.above else "the link"
+    seams = "seam of the sheet below" if design.above else "edge 0"
     yield (
-        "Clean the link with isopropanol and a cloth that leaves no lint, and let it dry for a minute. Draw two lines "
-        f"on it with a soft pencil, by *Place of {design.name}* below: where end 1 lies, around it, and where edge 0 "
+        f"Clean {ground} with isopropanol and a cloth that leaves no lint, and let it dry for a minute. Draw two lines "
+        f"on it with a soft pencil, by *Place of {design.name}* below: where end 1 lies, around it, and where {seams} "
         "lies, along it. "
         f"*Check:* the sizes around the link there, by tape measure, within 1 mm for each 100 mm. If they "
         "differ, this is another link than the design's: stop here."

@@ -66,7 +66,7 @@ def _meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: in
         return design.next_joint is not None
     start = design.place.link_frustum.translation
     for other in others:
-        if other.next_joint is not None:
+        if other.next_joint is not None and not other.above:
             far = other.place.link_frustum.apply((0.0, 0.0, other.place.frustum.height))
             if math.dist(far, start) < other.next_joint.inner + 1e-6:
                 return True
@@ -192,6 +192,8 @@ def jig_collars(
         return (), ()
     if design.place.bends:
         return (), (f"{design.name} lies on a link that is not round, for which no jig is made: measure its place",)
+    if design.above:
+        return (), (f"{design.name} lies on {design.above}, whose ends and seam show its place",)
     if design.place.frustum.cos_half_angle < _MIN_CONE_COSINE:
         return (), (f"{design.name} is too flat for collars: weigh it down with a board of its shape",)
     collars: list[Collar] = []

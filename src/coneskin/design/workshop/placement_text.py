@@ -19,6 +19,9 @@ _MAX_RULER = 0.2  # m; a ruler through the air
 def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     """Yield the distances by which a sheet is placed."""
     place, side = figures.placement, design.place.frustum
+    if design.above:
+        yield from _strip_placement(design)
+        return
     far = design.place.link_frustum.rotate((0.0, 0.0, 1.0))
     ahead = ", ".join(f"{value:z.3f}" for value in far)
     yield (
@@ -175,3 +178,22 @@ def _axes_around(design: SheetDesign) -> Iterator[tuple[str, float]]:
                 found = turn if turn <= wrap else None
             if found is not None:
                 yield f"{'+' if sign > 0.0 else '-'}{name}", found
+
+
+def _strip_placement(design: SheetDesign) -> Iterator[str]:
+    side = design.place.frustum
+    half1, half2 = 0.5 * side.wrap * side.radius1, 0.5 * side.wrap * side.radius2
+    yield (
+        f"It lies on the outside of {design.above}, over its seam, its ends flush with the ends of that sheet. Its "
+        "edge 0 "
+        "lies beside the edge of C of that sheet, its other edge beyond the seam."
+    )
+    middle, seam = 0.5 * side.wrap, design.seam_offset
+    yield ""
+    yield from table_head("from", "to", "distance")
+    yield f"| edge 0 of the strip | its other edge | {in_mm(2.0 * half1)} at end 1, {in_mm(2.0 * half2)} at end 2 |"
+    yield (
+        f"| seam of {design.above} | edge 0 of the strip, against the direction of the wrap | "
+        f"{in_mm(seam * side.radius1)} at end 1, {in_mm(seam * side.radius2)} at end 2 |"
+    )
+    yield f"| seam of {design.above} | middle of the strip | {in_mm((middle - seam) * side.radius1)} at end 1 |"
