@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
-from .decisions import SKIN_EVENTS, Decisions, EventPair, first_divergence, pair_events
+from .decisions import SKIN_EVENTS, Decisions, EventPair, either_event, first_divergence, pair_events
 from .replay.event_details import Tolerances, describe_differences, distance, milliseconds
 
 _STOP_WINDOW = 0.5  # s between a contact and the stop that is made for it
@@ -37,17 +37,17 @@ def _pair_subjects(pairs: Sequence[EventPair]) -> list[str]:
     counts = {False: 0, True: 0}
     contacts: list[tuple[str, float, str]] = []  # sensor, time, subject
     for pair in pairs:
-        if (event := _either_event(pair)).name == EventName.CONTACT:
+        if (event := either_event(pair)).name == EventName.CONTACT:
             new = pair[0] is None
             counts[new] += 1
             contacts.append(
                 (_touched_sensor(event), event.time, f"{'new contact' if new else 'contact'} {counts[new]}")
             )
-    subjects = [_subject(_either_event(pair), contacts) for pair in pairs]
+    subjects = [_subject(either_event(pair), contacts) for pair in pairs]
     often, seen = Counter(subjects), Counter[str]()
     for at, pair in enumerate(pairs):  # the first and the second standstill, and so on
         subject = subjects[at]
-        if subject == _event_words(_either_event(pair)) and often[subject] > 1:
+        if subject == _event_words(either_event(pair)) and often[subject] > 1:
             seen[subject] += 1
             subjects[at] = f"{subject} {seen[subject]}"
     return subjects
@@ -74,13 +74,6 @@ def _touched_sensor(event: GuardEvent) -> str:
     """Return the name of the sensor that an event is about; empty for none."""
     contact = event.details.get("contact")
     return str((contact if isinstance(contact, Mapping) else event.details).get("sensor", ""))
-
-
-def _either_event(pair: EventPair) -> GuardEvent:
-    """Return the event of a pair, the first one where it has both."""
-    event = pair[0] if pair[0] is not None else pair[1]
-    assert event is not None
-    return event
 
 
 _REACTION_EVENTS = (EventName.STOPPING, EventName.SPEED_REDUCED, EventName.RETREATING)
@@ -148,48 +141,45 @@ class Comparison:
         return max((d.moved for d in self.differences if d.moved is not None), default=0.0)
 
 
-def compare_decisions(
-    one: Decisions, other: Decisions, tolerances: Tolerances | None = None, shift: float | None = None
-) -> Comparison:
+def compare_decisions(one: Decisions, other: Decisions, tolerances: Tolerances | None = None) -> Comparison:
     """Compare two guards' decisions.
+
+    The other's times are first put on the clock of the first. Where the two are about the same recording, by their
+    start, they stay; else the first contacts (or the starts) coincide.
 
     Args:
         one: the reference.
         other: what is compared with it.
         tolerances: what does not count.
-        shift: what is added to the other's times [s]; None: 0 where the two are about the same recording, by their
-            start, else what makes their first contacts (or their starts) coincide.
     """
-    tolerances = tolerances or Tolerances()
-    if shift is None:
-        shift = _shift(one, other)
+    tolerances, shift = tolerances or Tolerances(), _shift(one, other)
     until = min(one.until, other.until + shift)
     window = max(one.window[0], other.window[0] + shift), min(one.window[1], other.window[1] + shift)
     if until < window[1]:
         window = window[0], math.nextafter(until, -math.inf)
-    ones, others = _within(one.events, window, 0.0), _within(other.events, window, shift)
+    shifted = [event._replace(time=event.time + shift) for event in other.events]
+    ones, others = ([e for e in side if window[0] <= e.time <= window[1]] for side in (one.events, shifted))
     if one.window != other.window:  # a cut beside the whole run
-        ones, others = _without_beginning(ones, others, shift)
+        ones, others = _without_beginning(ones, others)
     diverged = math.inf
     if shift == 0.0 and one.commands is not None and other.commands is not None:
         first, second = (
             [c for c in side if window[0] <= c.time <= window[1]] for side in (one.commands, other.commands)
         )
         diverged = first_divergence(first, second, tolerances)
-    kept = _comparable(ones, diverged), _comparable(others, diverged - shift)
+    kept = _comparable(ones, diverged), _comparable(others, diverged)
     left_out = len(ones) + len(others) - len(kept[0]) - len(kept[1])
-    pairs = pair_events(*kept, shift)
-    lost = one.missing or other.missing
+    pairs = pair_events(*kept)
     return Comparison(
         labels=(one.label, other.label),
-        differences=tuple(_differences(pairs, tolerances, shift)),
+        differences=tuple(_differences(pairs, tolerances)),
         paired=sum(a is not None and b is not None for a, b in pairs),
         new=sum(a is None for a, _ in pairs),
         missing=sum(b is None for _, b in pairs),
         diverged=None if math.isinf(diverged) else diverged - one.start,
         not_compared=left_out,
         until=None if math.isinf(until) else until - one.start,
-        lost=lost,
+        lost=one.missing or other.missing,
         other_code=other.other_code if one.other_code != other.other_code else (),
     )
 
@@ -220,20 +210,11 @@ def _shift(one: Decisions, other: Decisions) -> float:
     return one.start - other.start
 
 
-def _within(events: Sequence[GuardEvent], window: tuple[float, float], shift: float) -> list[GuardEvent]:
-    return [event for event in events if window[0] <= event.time + shift <= window[1]]
-
-
-def _without_beginning(
-    ones: list[GuardEvent], others: list[GuardEvent], shift: float
-) -> tuple[list[GuardEvent], list[GuardEvent]]:
+def _without_beginning(*sides: list[GuardEvent]) -> Iterator[list[GuardEvent]]:
     """Leave out how the guard of a cut became active, and what a guard learns before that."""
-    active = [next((e.time for e in side if e.name == EventName.ACTIVATED), -math.inf) for side in (ones, others)]
-    until = max(active[0], active[1] + shift)
-    return (
-        [_unlearned(event) for event in ones if event.name not in _START_EVENTS or event.time > until],
-        [_unlearned(event) for event in others if event.name not in _START_EVENTS or event.time + shift > until],
-    )
+    until = max(next((e.time for e in side if e.name == EventName.ACTIVATED), -math.inf) for side in sides)
+    for side in sides:
+        yield [_unlearned(event) for event in side if event.name not in _START_EVENTS or event.time > until]
 
 
 def _unlearned(event: GuardEvent) -> GuardEvent:
@@ -259,19 +240,22 @@ def _of_skin(reaction: GuardEvent) -> bool:
     return reaction.name == EventName.SPEED_REDUCED or "contact" in reaction.details
 
 
-def _differences(pairs: Sequence[EventPair], tolerances: Tolerances, shift: float) -> list[Difference]:
-    subjects = _pair_subjects([_on_one_clock(pair, shift) for pair in pairs])
+def _differences(pairs: Sequence[EventPair], tolerances: Tolerances) -> list[Difference]:
+    subjects = _pair_subjects(pairs)
     found: dict[str, Difference] = {}
     # a stop is told after its contact, whose event follows it
-    for (a, b), subject in sorted(zip(pairs, subjects, strict=True), key=lambda item: _is_stop(item[0])):
+    stops_last = sorted(
+        zip(pairs, subjects, strict=True), key=lambda it: either_event(it[0]).name == EventName.STOPPING
+    )
+    for (a, b), subject in stops_last:
         before = found.get(subject, Difference(subject, ()))
-        words, moved, delay = _words(a, b, tolerances, shift)
+        words, moved, delay = _words(a, b, tolerances)
         gone = "touch is missing", "touch is new"
         if any(word.startswith(gone) for word in before.words):
             words = [
                 word for word in words if not word.startswith(("located is ", "extent is ", "end is "))
             ]  # of course
-        if (name := _event_words(_either_event((a, b)))) == subject.rstrip(
+        if (name := _event_words(either_event((a, b)))) == subject.rstrip(
             " 0123456789"
         ):  # "retreat: missing", said once
             words = [word.removeprefix(f"{name} ").removeprefix("is ") for word in words]
@@ -282,30 +266,20 @@ def _differences(pairs: Sequence[EventPair], tolerances: Tolerances, shift: floa
     return [found[subject] for subject in dict.fromkeys(subjects) if subject in found]
 
 
-def _on_one_clock(pair: EventPair, shift: float) -> EventPair:
-    a, b = pair
-    return a, None if b is None else b._replace(time=b.time + shift)
-
-
-def _is_stop(pair: EventPair) -> bool:
-    return _either_event(pair).name == EventName.STOPPING
-
-
 def _words(
-    a: GuardEvent | None, b: GuardEvent | None, tolerances: Tolerances, shift: float
+    a: GuardEvent | None, b: GuardEvent | None, tolerances: Tolerances
 ) -> tuple[list[str], float | None, float | None]:
-    event = a if a is not None else b
-    assert event is not None
+    event = either_event((a, b))
     name = _event_words(event)
     if a is None or b is None:
         place = _place(event) if event.name == EventName.CONTACT else ""
         return [f"{name} is {'missing' if b is None else 'new'}{place}"], None, None
-    delay, words = b.time + shift - a.time, []
+    delay = b.time - a.time
     details = describe_differences(a.details, b.details, tolerances)
     prefix = "" if event.name == EventName.CONTACT else f"{name} "
     if event.name == EventName.STOPPING:  # what it says of its contact, the contact's own event says as well
         details = [line for line in details if not line.startswith("contact ")]
-    words += [f"{prefix}{line}" for line in details]
+    words = [f"{prefix}{line}" for line in details]
     if abs(delay) > tolerances.time:
         words.append(f"{name} {milliseconds(abs(delay))} {'later' if delay > 0.0 else 'earlier'}")
     moved = distance(a.details, b.details) if event.name in SKIN_EVENTS and words else None

@@ -128,16 +128,11 @@ EventPair = tuple[GuardEvent | None, GuardEvent | None]
 _PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
 
 
-def pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent], shift: float = 0.0) -> list[EventPair]:
+def pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent]) -> list[EventPair]:
     """Return the events of two runs in pairs, in the order of their times; None stands for one that is not there.
 
     At one time the skin's events come before the arm's. Two events pair where they have the same name and sensor and
     are nearest to each other, at most 0.5 s apart. What each guard says of the arm only once pairs at any time.
-
-    Args:
-        one: events of a run.
-        other: of the other run.
-        shift: is added to its times [s], where the clocks of the two are not one.
     """
     ours, theirs = _grouped(one), _grouped(other)
     pairs: list[EventPair] = []
@@ -146,14 +141,20 @@ def pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent], shift: f
         if len(one_group) == len(other_group) == 1 and key[0] not in SKIN_EVENTS:
             pairs.append((one_group[0], other_group[0]))
         else:
-            pairs += _pair_group(one_group, other_group, shift)
-    return sorted(pairs, key=lambda pair: _order(pair, shift))
+            pairs += _pair_group(one_group, other_group)
+    return sorted(pairs, key=_order)
 
 
-def _order(pair: EventPair, shift: float) -> tuple[float, bool]:
-    event = pair[0] or pair[1]
+def either_event(pair: EventPair) -> GuardEvent:
+    """Return the event of a pair, the first one where it has both."""
+    event = pair[0] if pair[0] is not None else pair[1]
     assert event is not None
-    return event.time + (0.0 if pair[0] else shift), event.name not in SKIN_EVENTS
+    return event
+
+
+def _order(pair: EventPair) -> tuple[float, bool]:
+    event = either_event(pair)
+    return event.time, event.name not in SKIN_EVENTS
 
 
 def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEvent]]:
@@ -163,13 +164,13 @@ def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEv
     return groups
 
 
-def _pair_group(one: list[GuardEvent], other: list[GuardEvent], shift: float) -> list[EventPair]:
+def _pair_group(one: list[GuardEvent], other: list[GuardEvent]) -> list[EventPair]:
     pairs: list[EventPair] = []
     i = j = 0
     while i < len(one) and j < len(other):
-        apart = other[j].time + shift - one[i].time
-        next_other = abs(other[j + 1].time + shift - one[i].time) if j + 1 < len(other) else float("inf")
-        next_one = abs(other[j].time + shift - one[i + 1].time) if i + 1 < len(one) else float("inf")
+        apart = other[j].time - one[i].time
+        next_other = abs(other[j + 1].time - one[i].time) if j + 1 < len(other) else math.inf
+        next_one = abs(other[j].time - one[i + 1].time) if i + 1 < len(one) else math.inf
         if apart < -_PAIR_WINDOW or (next_other < abs(apart) and len(other) - j > len(one) - i):
             pairs.append((None, other[j]))
             j += 1
