@@ -28,12 +28,7 @@ _MAX_SIZE = 1 << 28  # bytes
 
 
 def event_facts(events: Iterable[GuardEvent], start: float) -> list[dict[str, Any]]:
-    """Return events as values for JSON.
-
-    Args:
-        events: in order.
-        start: host time that counts as 0 [s].
-    """
+    """Return events as values for JSON; times count from a host time [s]."""
     return [{"t": event.time - start, "name": event.name.value, **event.details} for event in events]
 
 
@@ -91,7 +86,7 @@ def golden_path(recording: Path) -> Path:
     return recording.with_suffix(".events.json")
 
 
-def check_golden(recording: Path, tolerances: Tolerances) -> Comparison:
+def check_golden(recording: Path, tolerances: Tolerances | None = None) -> Comparison:
     """Compare what today's guard makes of a recording with its golden events.
 
     Raises:
@@ -107,7 +102,7 @@ def check_golden(recording: Path, tolerances: Tolerances) -> Comparison:
     return compare_decisions(reviewed, without_invented(again, recorded), tolerances)
 
 
-def update_golden(recording: Path, tolerances: Tolerances) -> bool:
+def update_golden(recording: Path, tolerances: Tolerances | None = None) -> bool:
     """Write today's events as the golden ones where they differ, and tell whether they did; errors as of the check."""
     if check_golden(recording, tolerances).same:
         return False

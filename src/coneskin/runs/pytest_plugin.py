@@ -52,7 +52,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Add the folders of runs to what is collected (called by pytest)."""
     config.stash[_UPDATED_FILES] = []
-    _check_tolerances(config)
+    _tolerances(config)  # one that does not exist is refused, whatever is collected
     named = [config.invocation_params.dir / name for name in config.getoption("--coneskin-runs")]
     folders = tuple(path.resolve() for path in (*named, *config.getini("coneskin_runs")))
     config.stash[_RUN_FOLDERS] = folders
@@ -124,26 +124,19 @@ class _RunDiffers(AssertionError):
     """A run is not as its golden events."""
 
 
-def _check_tolerances(config: pytest.Config) -> None:
-    """Refuse a tolerance that does not exist, whatever is collected; without any, nothing of coneskin is loaded."""
-    if not _tolerance_words(config):
-        return
+def _tolerances(config: pytest.Config) -> Tolerances | None:
+    """Return what does not count; None without any, so that nothing of coneskin is loaded."""
+    words = [*config.getini("coneskin_tolerances"), *config.getoption("--coneskin-tolerance")]
+    if not words:
+        return None
     from coneskin.core.errors import RecordingError
 
-    try:
-        _tolerances(config)
-    except RecordingError as exc:
-        raise pytest.UsageError(f"--coneskin-tolerance: {exc}") from exc
-
-
-def _tolerance_words(config: pytest.Config) -> list[str]:
-    return [*config.getini("coneskin_tolerances"), *config.getoption("--coneskin-tolerance")]
-
-
-def _tolerances(config: pytest.Config) -> Tolerances:
     from .replay.event_details import Tolerances
 
-    return Tolerances.from_words(_tolerance_words(config))
+    try:
+        return Tolerances.from_words(words)
+    except RecordingError as exc:
+        raise pytest.UsageError(f"--coneskin-tolerance: {exc}") from exc
 
 
 @pytest.fixture

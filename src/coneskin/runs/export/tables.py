@@ -15,7 +15,7 @@ from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
-from coneskin.runs.replay.event_details import QUANTITIES
+from coneskin.runs.replay.event_details import QUANTITIES, is_number, is_vector
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame
 
 if TYPE_CHECKING:
@@ -67,15 +67,13 @@ def _events(run: Run, start: float) -> Iterator[Table]:
     events = run.events
     if not events:
         return
-    names = dict.fromkeys(key for event in events for key in event.details)
     table: dict[str, list[Any]] = {
         "time_s": [event.time - start for event in events],
         "unix_s": [event.time + wall_clock(run) for event in events],
         "event": [event.name.value for event in events],
     }
-    for name in names:
-        values = [event.details.get(name) for event in events]
-        table.update(_columns(name, values))
+    for name in dict.fromkeys(key for event in events for key in event.details):
+        table.update(_columns(name, [event.details.get(name) for event in events]))
     table["details_json"] = [json.dumps(event.details) for event in events]
     yield table
 
@@ -87,16 +85,12 @@ def _columns(name: str, values: Sequence[Any]) -> Iterator[tuple[str, list[Any]]
     present = [value for value in values if value is not None]
     if all(isinstance(value, bool) for value in present) or all(isinstance(value, str) for value in present):
         yield name, list(values)
-    elif all(isinstance(value, int | float) and not isinstance(value, bool) for value in present):
+    elif all(map(is_number, present)):
         kind = int if all(isinstance(value, int) for value in present) else float
         yield f"{name}{unit}", [None if value is None else kind(value) for value in values]
-    elif all(isinstance(value, list | tuple) and len(value) == 3 and _numeric(value) for value in present):
+    elif all(is_vector(value) and len(value) == 3 for value in present):
         for axis, letter in enumerate("xyz"):
             yield f"{name}_{letter}{unit}", [None if value is None else float(value[axis]) for value in values]
-
-
-def _numeric(values: Sequence[Any]) -> bool:
-    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
 
 
 def _frames(run: Run, start: float, progress: Progress) -> Iterator[Table]:

@@ -171,25 +171,27 @@ def milliseconds(seconds: float) -> str:
 def distance(one: Mapping[str, Any], other: Mapping[str, Any]) -> float | None:
     """Return how far apart the points of two contacts are [m]; None where one has none."""
     a, b = one.get("point"), other.get("point")
-    if not (_is_vector(a) and _is_vector(b)) or len(a) != len(b):
+    if not (is_vector(a) and is_vector(b)) or len(a) != len(b):
         return None
     return math.dist(a, b)
 
 
-def _is_vector(value: Any) -> TypeGuard[Sequence[float]]:
-    return isinstance(value, list | tuple) and bool(value) and all(_is_number(item) for item in value)
+def is_vector(value: Any) -> TypeGuard[Sequence[float]]:
+    """Tell whether a detail is a list of numbers, and not empty."""
+    return isinstance(value, list | tuple) and bool(value) and all(map(is_number, value))
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Tell whether a detail is a number; true and false are none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _differ(key: str, a: Any, b: Any, tolerances: Tolerances, all_of_them: bool) -> Iterator[str]:
     quantity = QUANTITIES.get(key, _PLAIN_QUANTITY)
-    if _is_number(a) and _is_number(b):
+    if is_number(a) and is_number(b):
         if not _close(quantity, a, b, tolerances):
             yield f"{key} {_pair(quantity, a, b)}"
-    elif _is_vector(a) and _is_vector(b) and len(a) == len(b):
+    elif is_vector(a) and is_vector(b) and len(a) == len(b):
         if not all(_close(quantity, x, y, tolerances) for x, y in zip(a, b, strict=True)):
             yield _vector(key, quantity, a, b)
     elif isinstance(a, Mapping) and isinstance(b, Mapping):
