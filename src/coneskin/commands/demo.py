@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RecordingError, RobotRefused
+from coneskin.core.files import explain_os_error
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
 
@@ -202,10 +203,8 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.scene.required_packages import missing_packages
 
     folder = args.output or Path("runs") / time.strftime("demo-%Y-%m-%dT%H-%M-%S")
-    try:
+    with explain_os_error(RobotRefused, f"cannot make the folder {folder}", "; name another with -o"):
         folder.mkdir(parents=True)
-    except OSError as exc:
-        raise RobotRefused(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     host = free_host()
     for control in ("internal", "external"):
         text = _SCENE_TEXT.format(host=host, control=control, reaction=args.reaction)

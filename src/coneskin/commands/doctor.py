@@ -125,7 +125,7 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
         SceneError: the scene is written in a way in which it cannot be changed, or cannot be written.
     """
     from coneskin.commissioning.examination.examination import diff_texts, set_sensor_keys
-    from coneskin.core.files import write_whole
+    from coneskin.core.files import explain_os_error, write_whole
     from coneskin.scene.reader import parse_scene
 
     old = args.scene.read_text(encoding="utf-8")
@@ -137,10 +137,8 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
     if not (args.yes or (not args.json and _agrees())):
         print(f"coneskin doctor: {args.scene} was left as it is", file=sys.stderr)
         return
-    try:
+    with explain_os_error(lambda why: SceneError([why], str(args.scene)), "it cannot be written"):
         write_whole(args.scene, text)
-    except OSError as exc:
-        raise SceneError([f"it cannot be written: {exc.strerror or exc}"], str(args.scene)) from exc
     print(f"coneskin doctor: {args.scene} was changed; run it again", file=sys.stderr)
 
 

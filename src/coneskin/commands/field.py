@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import FieldError
+from coneskin.core.files import explain_os_error
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
 from .dimensions import add_key_options, given_keys
@@ -106,10 +107,8 @@ def _draw(model: FieldModel, errors: ErrorMap, radius: float, supply: float, fol
     from coneskin.skin.field.maps import FieldMap
     from coneskin.skin.field.pictures import draw_potential, paint_error
 
-    try:
+    with explain_os_error(FieldError, f"cannot make the folder {folder}", "; name another with -o"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as exc:
-        raise FieldError(f"cannot make the folder {folder}: {exc.strerror or exc}; name another with -o") from exc
     paths = [folder / f"{name}.png" for name in _PICTURES]
     sheet, live = model.sheet, f"{supply:g} V"
     contact = [Disc(0.5 * sheet.width, 0.5 * sheet.wrap, radius)]

@@ -9,10 +9,12 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
+
+from .errors import ConeSkinError
 
 _FILE_KINDS = {
     stat.S_IFDIR: "a folder",
@@ -23,6 +25,21 @@ _FILE_KINDS = {
 }
 #: a pipe that somebody puts there between the two looks must not hold the opening up
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
+
+
+@contextmanager
+def explain_os_error(refusal: Callable[[str], ConeSkinError], what: str, hint: str = "") -> Iterator[None]:
+    """Let an OSError in the ``with`` become one of our errors, which says what cannot be done, why, and what to do.
+
+    Args:
+        refusal: makes the error of a text.
+        what: cannot be done, such as "cannot write out.csv".
+        hint: what to do, with the punctuation before it.
+    """
+    try:
+        yield
+    except OSError as exc:
+        raise refusal(f"{what}: {exc.strerror or exc}{hint}") from exc
 
 
 def read_file(path: Path, limit: int) -> bytes:

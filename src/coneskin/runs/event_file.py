@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import read_file, write_whole
+from coneskin.core.files import explain_os_error, read_file, write_whole
 from coneskin.core.recording.block import is_time
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
@@ -75,10 +75,8 @@ def _write_events(path: Path, events: Iterable[GuardEvent], start: float) -> Non
         RecordingError: the file cannot be written.
     """
     lines = ",\n".join(json.dumps(item) for item in event_facts(events, start))
-    try:
+    with explain_os_error(RecordingError, f"cannot write the events {path}"):
         write_whole(path, f'{{"events": [\n{lines}\n]}}\n')
-    except OSError as exc:
-        raise RecordingError(f"cannot write the events {path}: {exc.strerror or exc}") from exc
 
 
 def golden_path(recording: Path) -> Path:

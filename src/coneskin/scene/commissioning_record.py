@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
-from coneskin.core.files import read_file, write_whole
+from coneskin.core.files import explain_os_error, read_file, write_whole
 from coneskin.core.text import read_json
 
 from .values.scene import Commissioning, facts_digest, sensor_facts
@@ -129,10 +129,8 @@ def write_record(scene: Scene, record: CommissioningRecord) -> Path:
         SceneError: it cannot be written.
     """
     path = _record_path(scene)
-    try:
+    with explain_os_error(lambda why: SceneError([why], scene.name), f"the record {path} cannot be written"):
         write_whole(path, json.dumps(asdict(record), indent=2) + "\n")
-    except OSError as exc:
-        raise SceneError([f"the record {path} cannot be written: {exc.strerror or exc}"], scene.name) from exc
     return path
 
 

@@ -18,11 +18,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
+from coneskin.core.files import explain_os_error
 from coneskin.core.recording.block import Block, decode_blocks
 from coneskin.core.recording.reader import parts_of
 from coneskin.core.recording.recorder import Recorder
 from coneskin.core.version import code_versions
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
+from coneskin.scene.tables.source_tables import source_label
 from coneskin.scene.values.scene import RecordingScene
 
 from .retention import prune_part
@@ -70,7 +72,8 @@ class EventLog:
         self.line = _HeardLine()
         self.physics: Callable[[], list[Block]] = list  # what it knows since it was last asked
         self._truths: deque[Block] = deque()  # that the thread which writes has not written yet
-        self._recorder = _recorder(recording, limits) if recording else None
+        size, keep = (limits.max_size, limits.keep) if limits else (None, None)
+        self._recorder = Recorder(recording, size, _COPIED_KINDS, keep, prune_part) if recording else None
         self._delivery = None if on_event is None else _EventDelivery(on_event)
         self._changed = threading.Condition()
 
@@ -184,12 +187,6 @@ def _recording_ended(now: float, why: ConeSkinError) -> GuardEvent:
     return GuardEvent(EventName.MESSAGE, now, {"what": f"recording ended: {why}"})
 
 
-def _recorder(path: Path, limits: RecordingScene | None) -> Recorder:
-    if limits is None:
-        return Recorder(path, copied=_COPIED_KINDS)
-    return Recorder(path, limits.max_size, _COPIED_KINDS, limits.keep, prune_part)
-
-
 def discard_recording(path: Path) -> None:
     """Remove the folder of a run that did not start, which ``new_recording`` has made; what else lies in it stays."""
     with contextlib.suppress(OSError):
@@ -208,7 +205,8 @@ def new_recording(folder: Path) -> Path:
     """
     stamp = time.strftime("%Y-%m-%dT%H-%M-%S")
     made, number = folder / stamp, 1
-    try:
+    what = f"cannot make the folder {made} for the recording"
+    with explain_os_error(RecordingError, what, "; see recording.folder"):
         for parent in (*reversed(folder.parents), folder):
             parent.mkdir(mode=0o700, exist_ok=True)
         while True:
@@ -218,10 +216,6 @@ def new_recording(folder: Path) -> Path:
             except FileExistsError:
                 number += 1
                 made = folder / f"{stamp}-{number}"
-    except OSError as exc:
-        raise RecordingError(
-            f"cannot make the folder {made} for the recording: {exc.strerror or exc}; see recording.folder"
-        ) from exc
 
 
 _MAX_WAITING = 1000  # events that wait
@@ -326,13 +320,5 @@ class _HeardLine:
         found = diagnose(capture, [item.sensor for item in scene.sensors], scene.source.settings.get("baud"))
         if found.verdict == "ok":
             return ""
-        if not capture.pieces:
-            return f"no byte has come from {_source_name(scene)}: {found.remedy}"
-        return f"on {_source_name(scene)}, {found.line}"
-
-
-def _source_name(scene: Scene) -> str:
-    from coneskin.scene.tables.source_tables import source_label
-
-    assert scene.source is not None
-    return source_label(scene.source)
+        name = source_label(scene.source)
+        return f"on {name}, {found.line}" if capture.pieces else f"no byte has come from {name}: {found.remedy}"

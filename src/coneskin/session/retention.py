@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from coneskin.core.progress import Progress, silent
-from coneskin.core.recording.block import Block
 from coneskin.core.recording.defects import DefectKind
-from coneskin.core.recording.reader import MAX_SIZE, parts_of, read_recording
+from coneskin.core.recording.reader import Recording, parts_of, read_recording
 from coneskin.core.recording.recorder import hold_against_recorder
 from coneskin.core.recording.retention import prune_file
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, decode_event
@@ -48,8 +47,8 @@ def prune_run(path: Path, around: float = AROUND, progress: Progress = silent) -
     path = path / "run.rec" if path.is_dir() else path
     recording = read_recording(path, progress)
     parts = parts_of(path)
-    with hold_against_recorder(parts[-1], MAX_SIZE):
-        windows = list(_windows(recording.select(kinds=_EVENT_KINDS), around))
+    with hold_against_recorder(parts[-1]):
+        windows = _windows(recording, around)
         # a touch may be in what is lost
         lost = [defect for defect in recording.defects if defect.kind is not DefectKind.DROPPED]
         windows += [(defect.since - around, defect.until + around) for defect in lost]
@@ -65,19 +64,16 @@ def prune_part(path: Path, around: float = AROUND) -> Iterator[None]:
     Raises:
         RecordingError: it cannot be read.
     """
-    yield from prune_file(path, list(_windows(read_recording(path).select(kinds=_EVENT_KINDS), around)), _KEPT_KINDS)
+    yield from prune_file(path, _windows(read_recording(path), around), _KEPT_KINDS)
 
 
-def _windows(blocks: Iterable[Block], around: float) -> Iterator[tuple[float, float]]:
-    """Yield the times around what is no ordinary event; those that overlap are one."""
-    since = until = None
-    for block in blocks:
-        if decode_event(block).name in _ORDINARY_EVENTS:
-            continue
-        if since is None or until is None or block.time - around > until:
-            if since is not None and until is not None:
-                yield since, until
+def _windows(recording: Recording, around: float) -> list[tuple[float, float]]:
+    """Return the times around what is no ordinary event; those that overlap are one."""
+    windows: list[tuple[float, float]] = []
+    for block in recording.select(kinds=_EVENT_KINDS):
+        if decode_event(block).name not in _ORDINARY_EVENTS:
             since = block.time - around
-        until = block.time + around
-    if since is not None and until is not None:
-        yield since, until
+            if windows and since <= windows[-1][1]:
+                since = windows.pop()[0]
+            windows.append((since, block.time + around))
+    return windows

@@ -7,11 +7,12 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from glob import escape
 from pathlib import Path
 from typing import BinaryIO
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import open_file
+from coneskin.core.files import explain_os_error, open_file
 from coneskin.core.progress import Progress, silent
 
 from .block import ALL_KINDS, COPY, DROPPED, FILE_KINDS, Block, decode_copy
@@ -95,7 +96,7 @@ class Recording:
                     continue
                 if extent.path not in files:
                     stack.close()
-                    files = {extent.path: stack.enter_context(_open(extent.path))}
+                    files = {extent.path: stack.enter_context(open_recording(extent.path))}
                 for chunk in walk(files[extent.path], extent.offset, extent.end):
                     if isinstance(chunk, Damage):
                         raise RecordingError(f"{extent.path} has changed while it was read, at byte {chunk.offset}")
@@ -108,7 +109,7 @@ class Recording:
 
 def parts_of(path: Path) -> list[Path]:
     """Return the files of a recording in their order: ``run.rec``, ``run.0001.rec``, ``run.0002.rec`` ..."""
-    further = sorted(path.parent.glob(f"{_escape(path.stem)}.[0-9][0-9][0-9][0-9]*{_escape(path.suffix)}"))
+    further = sorted(path.parent.glob(f"{escape(path.stem)}.[0-9][0-9][0-9][0-9]*{escape(path.suffix)}"))
     numbered = [part for part in further if part.name[len(path.stem) + 1 : -len(path.suffix) or None].isdecimal()]
     return [path, *sorted(numbered, key=lambda part: (len(part.name), part.name))]
 
@@ -128,10 +129,10 @@ def read_recording(path: Path, progress: Progress = silent) -> Recording:
     extents: list[Extent] = []
     damages: list[tuple[Path, int, Damage]] = []  # with the number of extents before it
     run: int | None = None
-    sizes = [_size(part) for part in paths]
+    sizes = [_size(part) for part in paths]  # what is written meanwhile is not waited for
     total, done = max(sum(sizes), 1), 0
     for part, size in zip(paths, sizes, strict=True):
-        with _open(part) as file:
+        with open_recording(part) as file:
             head = file.read(FILE_HEAD_SIZE)
             known = decode_file_head(head)
             if known is None and len(paths) == 1 and not head.startswith(MAGIC) and not holds_chunk(file):
@@ -158,16 +159,18 @@ def read_recording(path: Path, progress: Progress = silent) -> Recording:
     return Recording(own, copies, every, sum(sizes))
 
 
-def _open(path: Path) -> BinaryIO:
-    try:
+def open_recording(path: Path) -> BinaryIO:
+    """Open a file of a recording for reading.
+
+    Raises:
+        RecordingError: it cannot be read, or is too long.
+    """
+    with explain_os_error(RecordingError, f"cannot read the recording {path}"):
         return open_file(path, MAX_SIZE)
-    except OSError as exc:
-        raise RecordingError(f"cannot read the recording {path}: {exc.strerror or exc}") from exc
 
 
 def _size(path: Path) -> int:
-    """Return the size that a file has now [bytes]; what is written meanwhile is not waited for."""
-    with _open(path) as file:
+    with open_recording(path) as file:
         return os.fstat(file.fileno()).st_size
 
 
@@ -176,7 +179,3 @@ def _refuse(path: Path, head: bytes) -> None:
     if not head.startswith(MAGIC):
         raise RecordingError(f"{path} is no recording of coneskin: it does not begin with {MAGIC.decode()}")
     raise RecordingError(f"{path} has no header: not one chunk of it is intact")
-
-
-def _escape(name: str) -> str:
-    return "".join(f"[{letter}]" if letter in "[]*?" else letter for letter in name)

@@ -15,10 +15,11 @@ from types import TracebackType
 from typing import BinaryIO
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import open_file
+from coneskin.core.files import explain_os_error
 
 from .block import END, Block, encode_copy
 from .chunk import encode_chunk, encode_file_head
+from .reader import open_recording
 
 if sys.platform != "win32":
     import fcntl
@@ -105,7 +106,7 @@ class Recorder:
         """Hand all that was collected to the operating system, as a chunk.
 
         Raises:
-            RecordingError: the recording is closed, or the disk does not take it.
+            RecordingError: the disk does not take it.
         """
         if self._blocks:
             blocks, self._blocks, self._collected = self._blocks, [], 0
@@ -141,7 +142,7 @@ class Recorder:
         """Begin a file; the one before ends without a word, because the numbers of the chunks go on."""
         path = part_path(self.path, len(self.parts))
         try:
-            file = open(path, "xb", buffering=0, opener=_create)  # noqa: SIM115 - closed by ``close``
+            file = open(path, "xb", buffering=0, opener=open_for_owner)  # noqa: SIM115 - closed by ``close``
         except OSError as exc:
             if isinstance(exc, FileExistsError):
                 hint = (
@@ -168,25 +169,21 @@ class Recorder:
     def _close_part(self) -> None:
         if self._file is not None:
             file, self._file = self._file, None
-            try:
+            # a network's disk only then says that it is full
+            with explain_os_error(RecordingError, f"cannot close the recording {self.path}"):
                 file.close()
-            except OSError as exc:  # of a network's disk, which only then says that it is full
-                raise RecordingError(f"cannot close the recording {self.path}: {exc.strerror or exc}") from exc
 
     def _append(self, blocks: list[Block]) -> None:
         self._hand_over(encode_chunk(self._run, self._sequence, blocks))
         self._sequence += 1
 
     def _hand_over(self, data: bytes) -> None:
-        if self._file is None:
-            raise RecordingError(f"the recording {self.path} is not open")
+        assert self._file is not None  # whoever collects blocks has opened it
         self._written += len(data)
         view = memoryview(data)
-        try:
+        with explain_os_error(RecordingError, f"cannot write to the recording {self.path}"):
             while view:
                 view = view[self._file.write(view) or 0 :]
-        except OSError as exc:
-            raise RecordingError(f"cannot write to the recording {self.path}: {exc.strerror or exc}") from exc
 
 
 def part_path(path: Path, number: int) -> Path:
@@ -194,7 +191,8 @@ def part_path(path: Path, number: int) -> Path:
     return path if number == 0 else path.with_name(f"{path.stem}.{number:04d}{path.suffix}")
 
 
-def _create(name: str, flags: int) -> int:
+def open_for_owner(name: str, flags: int) -> int:
+    """Open a file that, where it is new, only its owner may read; for ``opener`` of ``open``."""
     return os.open(name, flags, _FILE_MODE)
 
 
@@ -206,21 +204,13 @@ def _mark_recorded(file: BinaryIO) -> None:
 
 
 @contextmanager
-def hold_against_recorder(path: Path, limit: int) -> Iterator[None]:
+def hold_against_recorder(path: Path) -> Iterator[None]:
     """Hold the lock of a file that no recorder writes.
-
-    Args:
-        path: the file.
-        limit: its largest length [bytes].
 
     Raises:
         RecordingError: it is being recorded now, or cannot be read.
     """
-    try:
-        file = open_file(path, limit)
-    except OSError as exc:
-        raise RecordingError(f"cannot read the recording {path}: {exc.strerror or exc}") from exc
-    with file:
+    with open_recording(path) as file:
         if sys.platform != "win32":
             try:
                 fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import draft_of, open_file
+from coneskin.core.files import draft_of, explain_os_error, open_file
 
 from .block import FILE_KINDS, Block
 from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head, encode_chunk
 from .defects import Defect, DefectKind, encode_drop
 from .reader import MAX_SIZE
+from .recorder import open_for_owner
 from .scan import Chunk, walk
 
 _MAX_KEPT_SIZE = 1 << 16  # bytes of blocks that are kept in one chunk in the place of several
@@ -34,17 +35,15 @@ def prune_file(path: Path, windows: Sequence[tuple[float, float]], kept: frozens
     Raises:
         RecordingError: the file cannot be read or replaced.
     """
-    try:
-        with draft_of(path, overwrite=True) as draft, open_file(path, MAX_SIZE) as file:
-            size, head = os.fstat(file.fileno()).st_size, file.read(FILE_HEAD_SIZE)
-            known = decode_file_head(head)
-            if known is None:
-                raise RecordingError(f"{path} cannot be pruned: its head is damaged")
-            with open(draft, "wb", opener=lambda name, flags: os.open(name, flags, 0o600)) as target:
-                target.write(head)
-                yield from _copy(file, size, target, known, windows, kept | FILE_KINDS)
-    except OSError as exc:
-        raise RecordingError(f"cannot prune {path}: {exc.strerror or exc}") from exc
+    failure = explain_os_error(RecordingError, f"cannot prune {path}")
+    with failure, draft_of(path, overwrite=True) as draft, open_file(path, MAX_SIZE) as file:
+        size, head = os.fstat(file.fileno()).st_size, file.read(FILE_HEAD_SIZE)
+        known = decode_file_head(head)
+        if known is None:
+            raise RecordingError(f"{path} cannot be pruned: its head is damaged")
+        with open(draft, "wb", opener=open_for_owner) as target:
+            target.write(head)
+            yield from _copy(file, size, target, known, windows, kept | FILE_KINDS)
 
 
 def _copy(
@@ -107,9 +106,10 @@ class _Shortened:
             return b""
         blocks, kinds = self._blocks, frozenset(self._kinds)
         if self._dropped:
-            place = {"size": self._bytes, "blocks": self._dropped, "kinds": kinds}
-            drop = Defect(DefectKind.DROPPED, self._since, self._until, **place)  # type: ignore[arg-type]
-            blocks = [encode_drop(self._since, drop), *blocks]
+            extent = Defect(
+                DefectKind.DROPPED, self._since, self._until, size=self._bytes, blocks=self._dropped, kinds=kinds
+            )
+            blocks = [encode_drop(self._since, extent), *blocks]
         data = encode_chunk(self._run, self._first, blocks, self._span)
         self._start()
         return data

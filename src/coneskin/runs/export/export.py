@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import draft_of
+from coneskin.core.files import draft_of, explain_os_error
 from coneskin.core.progress import Progress, silent
 
 from .tables import Pieces, Table, table_pieces
@@ -121,7 +121,7 @@ def export_run(run: Run, target: Path, form: str | None = None, progress: Progre
         raise RecordingError(f"{target} is named as {named}, but the format is {form}: name another, or choose {named}")
     if target.exists() and (target.is_file() or form in ("npz", "mcap")):
         raise RecordingError(f"{target} is there already; nothing is overwritten: name another")
-    try:
+    with explain_os_error(RecordingError, f"cannot write {target}"):
         if form in ("csv", "parquet"):
             from .parquet_file import write_parquet
 
@@ -140,8 +140,6 @@ def export_run(run: Run, target: Path, form: str | None = None, progress: Progre
             if not rows:
                 raise _nothing(run)
             return {target: rows}
-    except OSError as exc:
-        raise RecordingError(f"cannot write {target}: {exc.strerror or exc}") from exc
 
 
 def _nothing(run: Run) -> RecordingError:
