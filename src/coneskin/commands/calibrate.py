@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
 
-from .terminal import LiveReading, Person
+from .terminal import TouchTerminal, add_touch_options
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.calibration.calibrate import CalibrationResult, Calibrator
+    from coneskin.commissioning.calibration.calibrate import CalibrationResult
     from coneskin.scene.values.scene import Scene
 
 _DEFAULT_FOLDER = "calibrations"
@@ -42,17 +42,12 @@ _MARKS_HELP = "marks on each sensor, to be measured (default: those that its des
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
+    add_touch_options(parser, "residuals")
     add = parser.add_argument
-    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    add("--by", default="", metavar="NAME", help="who touches; goes into the record")
     add("--marks", type=int, choices=(4, 9, 16), default=0, help=_MARKS_HELP)
     add("--mark-error-mm", type=_mark_error, default=0.3, metavar="MM", help=_ERROR_HELP)
     add("--forces", type=_forces, default=(), metavar="N,N,...", help=_FORCES_HELP)
-    add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
     add("--skin", type=Path, metavar="SCENE", help="with --simulated: scene that says how the virtual skin was built")
-    add("--picture", type=Path, metavar="FILE", help="draw the residuals (png, svg, pdf)")
-    add("--list", action="store_true", help="list the marks, and touch nothing")
-    add("--json", action="store_true", help="print JSON objects, one per line")
 
 
 def _mark_error(text: str) -> float:
@@ -94,18 +89,16 @@ def run(args: argparse.Namespace) -> int:
         _check_names(scene, built)
     simulated = args.simulated or (args.list and scene.source is not None and is_simulated(scene.source.kind))
     check_touchable(scene, simulated)  # before the terminal is read
-    live = LiveReading(args.json)
-    person = None if args.simulated or args.list else Person()
-    refuses = person.refuses if person else lambda: False
+    terminal = TouchTerminal(args)
     calibrator = Calibrator(
-        TouchSession(scene, live.notice, live.reading, refuses, simulated, built),
+        TouchSession(scene, terminal.notice, terminal.reading, terminal.refuses, simulated, built),
         args.marks,
         1e-3 * args.mark_error_mm,
         args.forces,
         named_files(tables, scene.folder, "file"),
     )
     if args.list:
-        _list(calibrator, args.json)
+        terminal.list_marks((item.sensor.name, mark) for item in calibrator.sensors for mark in item.marks)
         return 0
     if not args.json:
         print("coneskin calibrate: the arm stands, and nothing guards it. Touch each mark with something narrow and")
@@ -157,10 +150,8 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         "along and around each is left at other places (rms)"
     )
     if result.fit is not None:
-        place, more = (
-            result.fit.next_mark,
-            "enough marks; one more" if result.fit.enough else "too few: touch one more,",
-        )
+        place = result.fit.next_mark
+        more = "enough marks; one more" if result.fit.enough else "too few: touch one more,"
         print(f"  next        {more} at {1e3 * place.u:.0f} mm, {math.degrees(place.phi):.0f} deg would tell most")
     print(f"  as leads    {leads} ohm more than lead_ohm, if it is leads")
     print(f"  sheets      {record.sheet_ohm[0]:.0f} and {record.sheet_ohm[1]:.0f} ohm per square, by their currents")
@@ -169,15 +160,3 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         print(f"  forces      level of {pairs}; a force that is read is known to {100.0 * record.force_error:.0f} %")
     hint = f'; it applies once the table of {name} has calibration = "{_DEFAULT_FOLDER}"' if unnamed else ""
     print(f"written to {path}{hint}; commission the skin again")
-
-
-def _list(calibrator: Calibrator, as_json: bool) -> None:
-    number = 0
-    for item in calibrator.sensors:
-        for mark in item.marks:
-            number += 1
-            if as_json:
-                line = {"number": number, "sensor": item.sensor.name, "where": mark.where}
-                print(json.dumps({"kind": "mark", **line, "u_mm": 1e3 * mark.u, "phi_rad": mark.phi}))
-            else:
-                print(f"{number:>3}  {item.sensor.name}: {mark.where}")

@@ -15,10 +15,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .terminal import LiveReading, Person
+from .terminal import TouchTerminal, add_touch_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,15 +27,9 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    add = parser.add_argument
-    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
-    add("--by", default="", metavar="NAME", help="who touches; goes into the record")
-    add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    add_touch_options(parser, "marks")
     help_text = "joint positions [deg] for which the marks are described (default: the controller is asked)"
-    add("--posture-deg", type=_posture, metavar="Q1,...,Q6", help=help_text)
-    add("--picture", type=Path, metavar="FILE", help="draw the marks (png, svg, pdf)")
-    add("--list", action="store_true", help="list the marks, and touch nothing")
-    add("--json", action="store_true", help="print JSON objects, one per line")
+    parser.add_argument("--posture-deg", type=_posture, metavar="Q1,...,Q6", help=help_text)
 
 
 def _posture(text: str) -> tuple[float, ...]:
@@ -57,10 +50,8 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
-    show = _Show(args.json)
-    person = None if args.simulated or args.list else Person()
-    refuses = person.refuses if person else lambda: False
-    session = TouchSession(scene, show.notice, show.reading, refuses, args.simulated)
+    terminal = TouchTerminal(args)
+    session = TouchSession(scene, terminal.notice, terminal.reading, terminal.refuses, args.simulated)
     commissioner = Commissioner(session, args.posture_deg)
 
     def begin(procedure: Procedure, q: Sequence[float] | None) -> None:
@@ -72,37 +63,16 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         procedure, q = commissioner.plan()
         begin(procedure, q)
-        show.plan(procedure)
+        terminal.list_marks((item.sensor.name, mark) for item in procedure.sensors for mark in item.plan)
         return 0
     if not args.json:
         print("coneskin commission: the arm stands, and nothing guards it. Touch each mark with one finger, firmly,")
         print('and hold it until it is read. "n" and Enter: out of reach, name another. Ctrl-C ends it.', flush=True)
     record = commissioner.run(args.by, begin)
     path = write_record(scene, record)
-    show.end(record.passed, record.cause, path)
+    if args.json:
+        print(json.dumps({"kind": "end", "passed": record.passed, "cause": record.cause, "record": str(path)}))
+    else:
+        said = "passed: the arm may move away from touches" if record.passed else "NOT passed: the arm only stops"
+        print(f"{terminal.clear()}{said}; written to {path}")
     return 0 if record.passed else 1
-
-
-class _Show(LiveReading):
-    """Output of the command."""
-
-    def plan(self, procedure: Procedure) -> None:
-        """List the marks."""
-        number = 0
-        for item in procedure.sensors:
-            for mark in item.plan:
-                number += 1
-                u_mm, phi_deg = round(1e3 * mark.u, 1), round(math.degrees(mark.phi), 1)
-                if self._json:
-                    line = {"number": number, "sensor": item.sensor.name, "where": mark.where}
-                    print(json.dumps({"kind": "mark", **line, "u_mm": u_mm, "phi_deg": phi_deg}))
-                else:
-                    print(f"{number:>3}  {item.sensor.name}: {mark.where}")
-
-    def end(self, passed: bool, cause: str, path: Path) -> None:
-        """Show the result."""
-        if self._json:
-            print(json.dumps({"kind": "end", "passed": passed, "cause": cause, "record": str(path)}))
-        else:
-            said = "passed: the arm may move away from touches" if passed else "NOT passed: the arm only stops"
-            print(f"{self.clear()}{said}; written to {path}")

@@ -11,15 +11,16 @@ import sys
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.touching import Notice
+    from coneskin.commissioning.touching import Mark, Notice
     from coneskin.skin.detection.frame.reading import TouchReading
 
 
@@ -131,17 +132,44 @@ def show_page(args: argparse.Namespace, url: str, words: str) -> threading.Event
 _LIVE_PERIOD = 0.2  # s between two lines of what is read now
 
 
-class LiveReading:
-    """Line of what the sensors read now, and the notices between.
+def add_touch_options(parser: argparse.ArgumentParser, picture: str) -> None:
+    """Declare the options of a command in which marks are touched, and whose picture shows what ``picture`` names."""
+    add = parser.add_argument
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
+    add("--by", default="", metavar="NAME", help="who touches; goes into the record")
+    add("--simulated", action="store_true", help="touch a virtual skin; refused for a real one")
+    add("--picture", type=Path, metavar="FILE", help=f"draw the {picture} (png, svg, pdf)")
+    add("--list", action="store_true", help="list the marks, and touch nothing")
+    add("--json", action="store_true", help="print JSON objects, one per line")
+
+
+class TouchTerminal:
+    """Terminal of a person who touches marks: what is to be done, what the sensors read now, and what the person says.
 
     Args:
-        as_json: an object for each line, for programs.
+        args: with ``json``, and with ``simulated`` and ``list``, with which there is no person.
     """
 
-    def __init__(self, as_json: bool) -> None:
-        self._json = as_json
-        self._live = sys.stdout.isatty() and not as_json
+    def __init__(self, args: argparse.Namespace) -> None:
+        self._json = args.json
+        self._live = sys.stdout.isatty() and not args.json
         self._shown = 0.0
+        self._lines = None if args.simulated or args.list else typed_lines()
+
+    def refuses(self) -> bool:
+        """Tell whether a mark was said to be out of reach since the last call."""
+        if self._lines is None or self._lines.empty():
+            return False
+        return self._lines.get().strip().lower() in ("n", "no")
+
+    def list_marks(self, marks: Iterable[tuple[str, Mark]]) -> None:
+        """List marks, each with the name of its sensor."""
+        for number, (sensor, mark) in enumerate(marks, 1):
+            if self._json:
+                place = {"where": mark.where, "u_mm": 1e3 * mark.u, "phi_deg": math.degrees(mark.phi)}
+                print(json.dumps({"kind": "mark", "number": number, "sensor": sensor, **place}))
+            else:
+                print(f"{number:>3}  {sensor}: {mark.where}")
 
     def notice(self, notice: Notice) -> None:
         """Show what the person is told."""
@@ -173,17 +201,3 @@ class LiveReading:
     def clear(self) -> str:
         """Return what takes the live line off the terminal."""
         return "\r\033[K" if self._live else ""
-
-
-class Person:
-    """Person at the terminal."""
-
-    def __init__(self) -> None:
-        self._lines = typed_lines()
-
-    def refuses(self) -> bool:
-        """Tell whether a mark was said to be out of reach since the last call."""
-        try:
-            return self._lines.get_nowait().strip().lower() in ("n", "no")
-        except queue.Empty:
-            return False

@@ -57,7 +57,7 @@ def test_a_calibration_asks_for_the_printed_marks_of_its_design(tmp_path: Path, 
     assert main(words) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["u_mm"] for line in lines] == pytest.approx([mark["u_mm"] for mark in marks])
-    assert [math.degrees(line["phi_rad"]) for line in lines] == pytest.approx([mark["phi_deg"] for mark in marks])
+    assert [line["phi_deg"] for line in lines] == pytest.approx([mark["phi_deg"] for mark in marks])
     assert [line["where"].split(",")[0] for line in lines] == [f"at the cross with number {n}" for n in range(1, 10)]
     assert main([*words, "--marks", "4"]) == 0  # to be measured
     assert "cross" not in capsys.readouterr().out
