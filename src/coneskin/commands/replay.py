@@ -31,6 +31,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError, SceneError
+from coneskin.core.progress import ProgressBar
 from coneskin.core.text import printable
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _list_runs(folder: Path) -> int:
 
 
 def _replay_one(args: argparse.Namespace) -> int:
-    from coneskin.core.progress import ProgressBar
+    from coneskin.runs.event_file import event_facts
     from coneskin.runs.replay.run import read_run
 
     recorded = read_run(args.runs[0], ProgressBar("read"))
@@ -101,7 +102,7 @@ def _replay_one(args: argparse.Namespace) -> int:
             "missing": result.missing or None,
             "other_code": result.other_code,
             "differences": result.differences,
-            "events": [{"t": e.time - start, "name": e.name, **e.details} for e in result.events],
+            "events": event_facts(result.events, start),
         }
         print(json.dumps(facts))
     else:
@@ -144,7 +145,6 @@ def _replay_with_settings(
     path: Path, words: Sequence[str], scene_file: Path | None, listed: bool, as_json: bool
 ) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
-    from coneskin.core.progress import ProgressBar
     from coneskin.robot.guard.signals.event_text import describe
     from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines, without_invented
     from coneskin.runs.decisions import decide_again, recorded_decisions
@@ -177,7 +177,6 @@ def _replay_with_settings(
 
 def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     """Replay many runs with each variant; return 0, 1 for a difference or an error, or 4 for a damaged run."""
-    from coneskin.core.progress import ProgressBar
     from coneskin.runs.what_if.batch import judge_runs
     from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
 
@@ -205,18 +204,8 @@ def _variants(args: argparse.Namespace) -> list[dict[str, Any]]:
     """Return the settings of each variant: those of --set in all, and every combination of --vary."""
     from coneskin.scene.settings import parse_choices, parse_settings
 
-    fixed = parse_settings(args.set)
-    axes = []
-    for word in args.vary:
-        name, values = parse_choices(word)
-        axes.append([{name: value} for value in values])
-    variants = []
-    for choice in itertools.product(*axes):
-        settings = dict(fixed)
-        for one in choice:
-            settings |= one
-        variants.append(settings)
-    return variants
+    fixed, choices = parse_settings(args.set), dict(map(parse_choices, args.vary))
+    return [{**fixed, **dict(zip(choices, values, strict=True))} for values in itertools.product(*choices.values())]
 
 
 def _report_runs(rows: Sequence[dict[str, Any]], varied: bool) -> None:
@@ -228,16 +217,13 @@ def _report_runs(rows: Sequence[dict[str, Any]], varied: bool) -> None:
     for (path, error), variants in broken.items():
         some = len(variants) < sum(row["path"] == path for row in rows)
         print(printable(f"{path}: BROKEN{' with ' + '; '.join(variants) if some else ''}: {error}"))
-    for row in rows:
-        if row["error"]:
-            continue
-        if not varied and not row["same"]:
-            why = row["first_difference"] or ("incomplete" if not row["complete"] else "the arm is commanded otherwise")
-            print(printable(f"{row['path']}: NOT the same: {why}"))
     good = [row for row in rows if not row["error"]]
     if not varied:
-        same = sum(bool(row["same"]) for row in good)
-        print(f"{same} of {len(rows)} run{'s'[: len(rows) != 1]} replayed the same as recorded")
+        different = [row for row in good if not row["same"]]
+        for row in different:
+            why = row["first_difference"] or ("incomplete" if not row["complete"] else "the arm is commanded otherwise")
+            print(printable(f"{row['path']}: NOT the same: {why}"))
+        print(f"{len(good) - len(different)} of {len(rows)} run{'s'[: len(rows) != 1]} replayed the same as recorded")
     elif any(row["truth"] == "recorded" for row in good):
         print(
             "no one knows what touched some of these runs: the contacts that they recorded count as the truth there, "

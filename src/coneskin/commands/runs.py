@@ -19,15 +19,16 @@ import argparse
 import json
 import math
 import sys
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.help_text import HelpFormatter
+from coneskin.core.progress import ProgressBar
 from coneskin.core.text import printable
 
 if TYPE_CHECKING:
-    from coneskin.core.progress import ProgressBar
     from coneskin.runs.decisions import Decisions
     from coneskin.runs.replay.run import Run
 
@@ -115,59 +116,68 @@ def run(args: argparse.Namespace) -> int:
     return {**work, "prune": _prune}[args.job](args)
 
 
+def _each(
+    args: argparse.Namespace, paths: Iterable[Path], job: Callable[[Path], tuple[dict[str, Any], str]], failed: str
+) -> list[dict[str, Any]]:
+    """Do a job for each run, print its line, or all rows as one JSON object, and return the rows.
+
+    Args:
+        args: with ``json``.
+        paths: of the runs.
+        job: returns the row and the line of a run.
+        failed: begins what is said of a run for which it raises; its row has an ``error``.
+    """
+    rows = []
+    for path in paths:
+        try:
+            row, line = job(path)
+        except ConeSkinError as exc:
+            row = {"path": str(path), "whole": False, "said": f"{failed}: {exc}", "error": str(exc)}
+            line = f"{path}: {row['said']}"
+        rows.append(row)
+        if not args.json:
+            print(printable(line))
+    if args.json:
+        print(json.dumps({"runs": rows}))
+    return rows
+
+
 def _list(args: argparse.Namespace) -> int:
     from coneskin.runs.run_files import find_recordings
 
-    rows: list[dict[str, object]] = []
-    broken = 0
+    def line(path: Path) -> tuple[dict[str, Any], str]:
+        facts = _summary(path)
+        said = "  INCOMPLETE" if facts["missing"] else ""
+        folder = path.parent if path.name == "run.rec" else path
+        size, arm = facts["size_bytes"] / 1e3, facts["arm"] or "-"
+        return facts, (
+            f"{facts['began'] or '':19}  {facts['duration_s']:8.1f} s  {size:6.0f} kB  {facts['contacts']:8}  "
+            f"{facts['stops']:5}  {arm:6}  {folder}{said}"
+        )
+
     if not args.json:
         print(f"{'began':19}  {'duration':>10}  {'size':>9}  contacts  stops  arm     run")
-    for path in find_recordings(args.runs, beside=True):
-        try:
-            facts = _summary(path)
-        except ConeSkinError as exc:
-            broken += 1
-            rows.append({"path": str(path), "error": str(exc)})
-            if not args.json:
-                print(printable(f"{path}: cannot be read: {exc}"))
-            continue
-        rows.append(facts)
-        if not args.json:
-            said = "  INCOMPLETE" if facts["missing"] else ""
-            folder = path.parent if path.name == "run.rec" else path
-            size, arm = facts["size_bytes"] / 1e3, facts["arm"] or "-"
-            print(printable(
-                f"{facts['began'] or '':19}  {facts['duration_s']:8.1f} s  {size:6.0f} kB  {facts['contacts']:8}  "
-                f"{facts['stops']:5}  {arm:6}  {folder}{said}"
-            ))  # fmt: skip
-    if args.json:
-        print(json.dumps({"runs": rows}))
-    return 1 if broken else 0
+    rows = _each(args, find_recordings(args.runs, beside=True), line, "cannot be read")
+    return 1 if any("error" in row for row in rows) else 0
 
 
 def _summary(path: Path) -> dict[str, Any]:
     from coneskin.runs.run_files import summarise_run
 
-    return summarise_run(path, _read(path), _bar(f"{path}"))
+    return summarise_run(path, _read(path), ProgressBar(f"{path}"))
 
 
 def _read(path: Path) -> Run:
     from coneskin.runs.replay.run import read_run
 
-    return read_run(path, _bar(f"reading {path}"))
-
-
-def _bar(what: str) -> ProgressBar:
-    from coneskin.core.progress import ProgressBar
-
-    return ProgressBar(what)
+    return read_run(path, ProgressBar(f"reading {path}"))
 
 
 def _info(args: argparse.Namespace) -> int:
     from coneskin.runs.run_files import summarise_run
 
     recorded = _read(args.run)
-    facts = summarise_run(args.run, recorded, _bar(f"{args.run}"))
+    facts = summarise_run(args.run, recorded, ProgressBar(f"{args.run}"))
     if args.json:
         print(json.dumps(facts))
         return 0
@@ -193,20 +203,13 @@ def _info(args: argparse.Namespace) -> int:
 def _verify(args: argparse.Namespace) -> int:
     from coneskin.runs.run_files import find_recordings
 
-    rows, codes = [], {0}
-    for path in find_recordings(args.runs, beside=True):
-        try:
-            missing = _summary(path)["missing"]
-            code, said = (INCOMPLETE, f"incomplete: {missing}") if missing else (0, "whole")
-        except ConeSkinError as exc:
-            code, said = 1, f"cannot be read: {exc}"
-        codes.add(code)
-        rows.append({"path": str(path), "whole": code == 0, "said": said})
-        if not args.json:
-            print(printable(f"{path}: {said}"))
-    if args.json:
-        print(json.dumps({"runs": rows}))
-    return 1 if 1 in codes else max(codes)
+    def check(path: Path) -> tuple[dict[str, Any], str]:
+        missing = _summary(path)["missing"]
+        said = f"incomplete: {missing}" if missing else "whole"
+        return {"path": str(path), "whole": not missing, "said": said}, f"{path}: {said}"
+
+    rows = _each(args, find_recordings(args.runs, beside=True), check, "cannot be read")
+    return 1 if any("error" in row for row in rows) else 0 if all(row["whole"] for row in rows) else INCOMPLETE
 
 
 def _cut(args: argparse.Namespace) -> int:
@@ -218,17 +221,10 @@ def _cut(args: argparse.Namespace) -> int:
     target = args.output or Path(f"{name}-cut.rec")
     run = _read(path)
     around = first_touch(run) if args.around is None else args.around
-    done = cut_run(run, target, around, args.keep, name, _bar("the whole run"))
-    facts = {
-        "path": str(done.path),
-        "size_bytes": done.size,
-        "since_s": done.since,
-        "until_s": done.until,
-        "contacts": done.contacts,
-        "active": done.active,
-        "other_reaction": done.other_reaction or None,
-    }
+    done = cut_run(run, target, around, args.keep, name, ProgressBar("the whole run"))
     if args.json:
+        facts = {"path": str(done.path), "size_bytes": done.size, "since_s": done.since, "until_s": done.until}
+        facts |= {"contacts": done.contacts, "active": done.active, "other_reaction": done.other_reaction or None}
         print(json.dumps(facts))
         return 0
     print(f"{done.path}: {done.size / 1e3:.0f} kB, from {done.since:.3f} s to {done.until:.3f} s")
@@ -276,22 +272,23 @@ def _sides(args: argparse.Namespace, beside: Path | None = None) -> tuple[Decisi
 
         if beside is not None:
             raise RecordingError("--python compares two versions of the code on one run: leave B out")
-        today = decide_again(first, settings, "today's code", progress=_bar("today's code"))
+        today = decide_again(first, settings, "today's code", progress=ProgressBar("today's code"))
         return decide_with(args.python, args.one, recorded_decisions(first)), today
     if settings:
         label = "today's code" if beside is None else str(args.one)
-        return decide_again(first, label=label, progress=_bar(label)), decide_again(
-            second, settings, progress=_bar("with the settings")
-        )
+        before = decide_again(first, label=label, progress=ProgressBar(label))
+        return before, decide_again(second, settings, progress=ProgressBar("with the settings"))
     if beside is None:
-        return recorded_decisions(first), decide_again(first, label="today's code", progress=_bar("today's code"))
+        return recorded_decisions(first), decide_again(
+            first, label="today's code", progress=ProgressBar("today's code")
+        )
     return recorded_decisions(first, str(args.one)), recorded_decisions(second, str(beside))
 
 
 def _export(args: argparse.Namespace) -> int:
     from coneskin.runs.export.export import export_run
 
-    written = export_run(_read(args.run), args.output, args.format, _bar("the frames"))
+    written = export_run(_read(args.run), args.output, args.format, ProgressBar("the frames"))
     if args.json:
         print(json.dumps({"files": [{"path": str(path), "rows": rows} for path, rows in written.items()]}))
     else:
@@ -306,17 +303,11 @@ def _prune(args: argparse.Namespace) -> int:
 
     if not 0.0 <= args.around < math.inf:
         raise RecordingError(f"--around must be 0 s or more, got {args.around:g}")
-    rows: list[dict[str, object]] = []
-    for path in args.runs:
-        try:
-            before, after = prune_run(path, args.around, _bar(f"reading {path}"))
-            rows.append({"path": str(path), "bytes_before": before, "bytes_after": after})
-            words = f"{path}: {before / 1e6:.3f} -> {after / 1e6:.3f} MB"
-        except ConeSkinError as exc:
-            rows.append({"path": str(path), "error": str(exc)})
-            words = f"{path}: not pruned: {exc}"
-        if not args.json:
-            print(printable(words))
-    if args.json:
-        print(json.dumps({"runs": rows}))
+
+    def prune(path: Path) -> tuple[dict[str, Any], str]:
+        before, after = prune_run(path, args.around, ProgressBar(f"reading {path}"))
+        row = {"path": str(path), "bytes_before": before, "bytes_after": after}
+        return row, f"{path}: {before / 1e6:.3f} -> {after / 1e6:.3f} MB"
+
+    rows = _each(args, args.runs, prune, "not pruned")
     return 1 if any("error" in row for row in rows) else 0
