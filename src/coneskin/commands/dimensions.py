@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.keys import Key, check
+from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
+
+if TYPE_CHECKING:
+    from coneskin.geometry.frustum import Frustum
 
 
 def option_name(key: Key) -> str:
@@ -33,6 +37,24 @@ def add_key_options(
         default = (defaults or {}).get(key.plain)
         text = key.meaning.replace("%", "%%") + (f" (default: {default})" if default else "")
         add(option_name(key), type=key.kind, metavar=_metavar(key), required=key.plain in required, help=text)
+
+
+def add_cone_options(add: Callable[..., Any]) -> None:
+    """Declare the options of the cone of a link, with the ``add_argument`` of a parser."""
+    defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
+    add_key_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+
+
+def given_cone(args: argparse.Namespace) -> Frustum:
+    """Return the cone of a link that the options give; errors as of ``given_keys``.
+
+    Raises:
+        GeometryError: there is no such cone.
+    """
+    from coneskin.geometry.frustum import Frustum
+
+    dimensions = given_keys(args, LINK_CONE_KEYS)
+    return Frustum(**{"radius2": dimensions["radius1"], **dimensions})
 
 
 def _metavar(key: Key) -> str:

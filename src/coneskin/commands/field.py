@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import FieldError
 from coneskin.core.files import explain_os_error
-from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
 
-from .dimensions import add_key_options, given_keys
+from .dimensions import add_cone_options, given_cone
 
 if TYPE_CHECKING:
     from coneskin.skin.field.maps import ErrorMap
@@ -36,15 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = "Solve the field of your sensor exactly: potential maps, error maps, resistances."
     add = parser.add_argument
-    defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
-    add_key_options(add, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+    add_cone_options(add)
     add("--upper-ohm", type=float, default=1000.0, help="upper sheet resistance [ohm per square] (default: 1000)")
     add("--lower-ohm", type=float, help="lower sheet resistance [ohm per square] (default: that of the upper one)")
     add("--contact-mm", type=float, default=5.0, help="radius of the contact (default: 5)")
     add("--supply-v", type=float, default=2.5, help="potential of the driven electrode (default: 2.5)")
     add("--grid", type=int, default=41, help="points along each side of an error map (default: 41)")
-    folder_help = "folder for the pictures (default: field)"
-    add("-o", "--output", type=Path, default=Path("field"), metavar="DIR", help=folder_help)
+    add("-o", "--output", type=Path, default=Path("field"), metavar="DIR", help="folder for the pictures (field)")
     add("--no-pictures", action="store_true", help="print the numbers, write no file")
     add("--json", action="store_true", help="print one JSON object")
 
@@ -59,7 +56,6 @@ def run(args: argparse.Namespace) -> int:
     """
     import numpy as np
 
-    from coneskin.geometry.frustum import Frustum
     from coneskin.skin.field.maps import ErrorMap
     from coneskin.skin.field.model import FieldModel
     from coneskin.skin.field.sheet import SectorSheet
@@ -67,8 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.grid < 2:
         raise FieldError(f"--grid must be at least 2 points, got {args.grid}")
-    dimensions = given_keys(args, LINK_CONE_KEYS)
-    cone = Frustum(**{"radius2": dimensions["radius1"], **dimensions})
+    cone = given_cone(args)
     lower_ohm = args.upper_ohm if args.lower_ohm is None else args.lower_ohm
     radial_ohm, angular_ohm = sheet_resistances(cone, args.upper_ohm, lower_ohm)
     model = FieldModel(SectorSheet.of_frustum(cone), args.upper_ohm, lower_ohm)

@@ -15,10 +15,13 @@ import json
 import sys
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SkinTimeout
 from coneskin.core.text import positive_seconds
+
+from .terminal import print_line
 
 if TYPE_CHECKING:
     from coneskin.skin.sources.serial_port import PortFacts
@@ -41,10 +44,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list(find_ports(), args.json)
-
-    def say(words: str) -> None:
-        print(words, file=sys.stderr, flush=True)
-
+    say = partial(print_line, file=sys.stderr)
     port = _find_port(find_ports, say, args.timeout_s)
     trouble, name = port_trouble(port.device), stable_name(port.device)
     if args.json:

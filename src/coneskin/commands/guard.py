@@ -167,21 +167,14 @@ class _Work:
         """Wait for a person to let the arm move again."""
         again = "; its motion then goes on" if self._session.scene.motion else ""
         person.ignore_earlier_lines()
-        print(
-            f'type "reset" and Enter to let the arm move again{again}; Ctrl-C ends the guard',
-            file=sys.stderr,
-            flush=True,
-        )
+        print_line(f'type "reset" and Enter to let the arm move again{again}; Ctrl-C ends the guard', sys.stderr)
         while time.monotonic() < self._end and not person.serve(self._session, 0.2):
             self._session.check_guard()
 
     def _hold(self) -> None:
         """Stay while an externally controlled arm has no guard, so that it is held at standstill."""
-        print(
-            "the arm is held at standstill from here until the guard lives again, or you end this with Ctrl-C",
-            file=sys.stderr,
-            flush=True,
-        )
+        said = "the arm is held at standstill from here until the guard lives again, or you end this with Ctrl-C"
+        print_line(said, sys.stderr)
         while time.monotonic() < self._end and self._lost():
             time.sleep(0.1)
 

@@ -36,8 +36,6 @@ def run(args: argparse.Namespace) -> int:
         )
     frequency = scene.arm.watchdog_hz
     print(load_driver(arm_model(scene.arm.model).family).heartbeat_lines(frequency), end="")
-    print(
-        f"the program ends {1000.0 / frequency:g} ms after the guard's last heartbeat (arm.watchdog_hz)",
-        file=sys.stderr,
-    )
+    lifetime = f"{1000.0 / frequency:g} ms after the guard's last heartbeat (arm.watchdog_hz)"
+    print(f"the program ends {lifetime}", file=sys.stderr)
     return 0

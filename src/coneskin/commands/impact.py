@@ -20,9 +20,10 @@ import math
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
+from coneskin.core.text import finite
 
 if TYPE_CHECKING:
     from coneskin.impact.simulation.impact_outcome import ImpactOutcome
@@ -59,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     scenes = {way: with_commissioning(_with_reaction(scene, way), time.time()) for way in ways}
     found = {way: _collide(scenes[way], way, args) for way in ways}
     if args.json:
-        print(json.dumps({way: _plain(outcome) for way, outcome in found.items()}))
+        print(json.dumps({way: finite(asdict(outcome)) for way, outcome in found.items()}))
     else:
         _print(scenes, found)
     guarded = [outcome for way, outcome in found.items() if way not in _NO_GUARD]
@@ -96,11 +97,6 @@ def _collide(scene: Scene, way: str, args: argparse.Namespace) -> ImpactOutcome:
     first, *rest = motion.waypoints
     run = CollisionRun(scene, scene.bodies, first, protection=protection, seed=args.seed)
     return run.run(follow_waypoints(rest, motion.speed, motion.acceleration), longest=args.longest_s)
-
-
-def _plain(outcome: ImpactOutcome) -> dict[str, Any]:
-    """Return an outcome for JSON, which has no NaN."""
-    return {name: None if math.isnan(value) else value for name, value in asdict(outcome).items()}
 
 
 def _print(scenes: dict[str, Scene], found: dict[str, ImpactOutcome]) -> None:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import shlex
 import sys
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
+from coneskin.core.text import finite
 
 from .terminal import print_hint
 
@@ -80,7 +80,7 @@ def _plain(found: SpeedMap) -> dict[str, Any]:
     del table["digest"]  # of the file; this has more
     for row, patch, mass in zip(table["patch"], found.patches, found.masses, strict=True):
         row["link"] = patch.link
-        row["mass_kg"] = None if math.isinf(mass) else mass
+        row["mass_kg"] = finite(mass)
         row["point_mm"] = [1e3 * value for value in patch.point]
         row["normal"] = list(patch.normal)
     return table

@@ -15,25 +15,22 @@ import argparse
 import json
 import math
 
-from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
+from coneskin.core.text import finite
 
-from .dimensions import add_key_options, given_keys
+from .dimensions import add_cone_options, given_cone
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    defaults = {"radius2": "radius 1, a cylinder", "wrap": "360"}
-    add_key_options(parser.add_argument, LINK_CONE_KEYS, ("radius1", "height"), defaults)
+    add_cone_options(parser.add_argument)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the sector of the cone; the exit code is 0."""
-    from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.sector import unroll
 
-    dimensions = given_keys(args, LINK_CONE_KEYS)
-    cone = Frustum(**{"radius2": dimensions["radius1"], **dimensions})
+    cone = given_cone(args)
     sector = unroll(cone)
     facts = {
         "r1_mm": 1e3 * sector.r1,
@@ -46,8 +43,7 @@ def run(args: argparse.Namespace) -> int:
         "area_cm2": 1e4 * sector.area,
     }
     if args.json:
-        finite = {key: value if math.isfinite(value) else None for key, value in facts.items()}
-        print(json.dumps(finite, allow_nan=False))
+        print(json.dumps(finite(facts)))
         return 0
     for key, value in facts.items():
         name, unit = key.rsplit("_", 1)

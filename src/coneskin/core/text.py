@@ -7,9 +7,10 @@ title.
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any, TextIO
 
@@ -46,6 +47,15 @@ def _encodable(value: Any) -> Any:
     if isinstance(value, dict):
         return {_encodable(name): _encodable(item) for name, item in value.items()}
     return value
+
+
+def finite(value: Any) -> Any:
+    """Return a value for JSON, which has neither NaN nor infinity: None stands in the place of each."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    return [finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def painted(text: str, color: str, stream: TextIO) -> str:

@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import ipaddress
 import json
-import math
 import socket
-from collections.abc import Mapping
-from typing import Any
 from urllib.parse import urlsplit
 
 from coneskin.core.errors import SceneError
+from coneskin.core.text import finite
 from coneskin.robot.guard.signals.journal import GuardEvent
 
 _MAX_DATAGRAM = 8000  # bytes of a datagram; loopback and most networks carry them
@@ -23,19 +21,11 @@ _URL_EXAMPLE = "write udp://127.0.0.1:9870"
 
 def _event_message(event: GuardEvent, began: float) -> bytes:
     """Return an event as JSON: ``t`` [s] since the run began, ``name``, and its details; what is not finite is null."""
-    message = {"t": round(event.time - began, 6), "name": str(event.name), **_finite(event.details)}
+    message = {"t": round(event.time - began, 6), "name": str(event.name), **finite(event.details)}
     data = json.dumps(message, separators=(",", ":")).encode()
     if len(data) > _MAX_DATAGRAM:
         data = json.dumps({"t": message["t"], "name": message["name"], "cut": len(data)}).encode()
     return data
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 class EventPublisher:
