@@ -141,7 +141,7 @@ def test_it_ages_where_the_scene_says_so(tmp_path: Path) -> None:
     assert known(scene, 29.9).valid
     assert "31.0 days old, 30 days are allowed (commissioning.max_age_days)" in known(scene, 31.0).note
     assert not known(scene, 31.0).valid
-    assert "which is still to come: set the date" in known(scene, -2.0).note
+    assert "which is still to come; set the date" in known(scene, -2.0).note
     assert not known(scene, -2.0).valid
 
 

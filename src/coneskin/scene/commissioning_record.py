@@ -27,7 +27,7 @@ MAX_MISS = (0.020, math.radians(25.0))  #: m along the link, and rad about it, b
 _CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
 _MAX_BYTES = 1 << 20  # of a record
 _DAY_SECONDS = 86400.0  # s
-_CLOCK_ERROR = 1.0  # days that a record may be ahead of this computer's date
+_CLOCK_ERROR = _DAY_SECONDS  # s that a record may be ahead of this computer's date
 _HOW_TO = "see `coneskin commission`"
 
 
@@ -172,34 +172,36 @@ def _check(scene: Scene, now: float) -> Commissioning:
     try:
         record = _read_record(path)
     except FileNotFoundError:
-        return Commissioning(False, f"there is no commissioning record {path.name}: {_HOW_TO}")
+        why = f"there is no commissioning record {path.name}"
     except ValueError as exc:
-        return Commissioning(False, f"the commissioning record {path.name} is of no use, {exc}: {_HOW_TO}")
-    then = datetime.fromisoformat(record.date)
-    then = then if then.tzinfo else then.replace(tzinfo=UTC)
-    day = f"{then:%Y-%m-%d}"
-    age = (now - then.timestamp()) / _DAY_SECONDS
+        why = f"the commissioning record {path.name} is of no use, {exc}"
+    else:
+        then = datetime.fromisoformat(record.date)
+        then = then if then.tzinfo else then.replace(tzinfo=UTC)
+        if not (why := _objection(scene, record, f"{then:%Y-%m-%d}", now - then.timestamp())):
+            by = f" by {record.by}" if record.by else ""
+            return Commissioning(True, f"passed on {then:%Y-%m-%d}{by}, {len(record.marks)} marks")
+    return Commissioning(False, f"{why}: {_HOW_TO}")
+
+
+def _objection(scene: Scene, record: CommissioningRecord, day: str, age: float) -> str:
+    """Return what stands against a record of a day, of this age [s]; empty where it is valid."""
+    it, limit = f"the commissioning of {day}", scene.commissioning_max_age
     if record.passed is not True or not record.marks or not all(mark.passed is True for mark in record.marks):
-        why = f"the commissioning of {day} has failed{f', {record.cause}' if record.cause else ''}: {_HOW_TO}"
-        return Commissioning(False, why)
+        return f"{it} has failed{f', {record.cause}' if record.cause else ''}"
     if record.fingerprint != fingerprint(scene):
-        changed = (
-            "arm, link, pose, geometry, wiring, electronics or calibration of a sensor, or the kind of source, is "
-            "another now"
+        return (
+            f"{it} was of another scene, arm, link, pose, geometry, wiring, electronics or calibration of a sensor, or "
+            "the kind of source, is another now"
         )
-        return Commissioning(False, f"the commissioning of {day} was of another scene, {changed}: {_HOW_TO}")
     if flaw := _flaw(scene, record):
-        return Commissioning(False, f"the commissioning of {day} is not complete, {flaw}: {_HOW_TO}")
-    limit = scene.commissioning_max_age
-    if limit is not None and age * _DAY_SECONDS > limit:
+        return f"{it} is not complete, {flaw}"
+    if limit is not None and age > limit:
         allowed = f"{limit / _DAY_SECONDS:g} days are allowed (commissioning.max_age_days)"
-        return Commissioning(False, f"the commissioning of {day} is {age:.1f} days old, {allowed}: {_HOW_TO}")
+        return f"{it} is {age / _DAY_SECONDS:.1f} days old, {allowed}"
     if limit is not None and age < -_CLOCK_ERROR:
-        return Commissioning(
-            False, f"the commissioning is dated {day}, which is still to come: set the date; {_HOW_TO}"
-        )
-    by = f" by {record.by}" if record.by else ""
-    return Commissioning(True, f"passed on {day}{by}, {len(record.marks)} marks")
+        return f"the commissioning is dated {day}, which is still to come; set the date"
+    return ""
 
 
 def _flaw(scene: Scene, record: CommissioningRecord) -> str:

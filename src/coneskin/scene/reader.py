@@ -38,7 +38,7 @@ TABLES = (
     "padding",
     "speed_limit",
 )
-_TUBE_LENGTHS = {"upper_arm": 1, "forearm": 2}  # link name -> index of the DH length that is the tube's
+TUBE_LENGTHS = {"upper_arm": 1, "forearm": 2}  #: link name -> index of the DH length that is the tube's
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
 _MAX_PARTS = 64
 _DOTTED_PART = re.compile(r"[\w\"'-][ \t]*\.")
@@ -59,10 +59,8 @@ def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
     try:
         text = read_file(path, MAX_SIZE).decode("utf-8-sig")  # some editors put a byte-order mark in front
     except UnicodeDecodeError as exc:
-        raise SceneError(
-            [f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8; save the scene as UTF-8 text"],
-            str(path),
-        ) from exc
+        what = f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8; save the scene as UTF-8 text"
+        raise SceneError([what], str(path)) from exc
     except OSError as exc:
         raise SceneError([f"the file cannot be read: {exc.strerror or exc}"], str(path)) from exc
     return parse_scene(text, path.name, path.parent, calibrated=calibrated)
@@ -111,7 +109,8 @@ def parse_scene(
 
         limited = inline_speed_limit(tables, opened, problems)
     text = inline_sensor_files(tables, opened, problems, calibrated, limited) or text
-    reaction, rules = read_reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
+    reaction, rules = read_reaction(tables, problems)
+    commissioned = check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems)
     scene = s.Scene(
         name=name,
         text=text,
@@ -124,9 +123,7 @@ def parse_scene(
         monitoring=read_monitoring(tables, problems),
         recording=_recording(tables, folder, problems),
         motion=read_motion(tables, problems),
-        commissioning_max_age=check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems).get(
-            "max_age"
-        ),
+        commissioning_max_age=commissioned.get("max_age"),
         commissioning=commissioning,
         bodies=read_bodies(tables, problems),
         padding=read_padding(tables, problems),
@@ -190,8 +187,8 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
                 problems.append(f"link {link.name}: the name {sensor.name} is already on link {seen[sensor.name]}")
             seen[ident] = seen[sensor.name] = link.name
     if "arm" not in named:
-        needed = {"reaction": "[reaction] needs an [arm] that can react"}
-        needed |= {
+        needed = {
+            "reaction": "[reaction] needs an [arm] that can react",
             "body": "[[body]] needs an [arm] that can run into it",
             "motion": "[motion] needs an [arm] that can move",
         }
@@ -223,8 +220,8 @@ def _check_links(scene: s.Scene, problems: list[str]) -> None:
         except KinematicsError:
             problems.append(f"link {link.name}: an arm has no such link; it has {', '.join(LINK_INDEX)}")
             continue
-        if arm is not None and name in _TUBE_LENGTHS:
-            _check_length(link, abs(arm.a[_TUBE_LENGTHS[name]]), arm.name, problems)
+        if arm is not None and name in TUBE_LENGTHS:
+            _check_length(link, abs(arm.a[TUBE_LENGTHS[name]]), arm.name, problems)
     if arm is not None and scene.motion is not None:
         _check_limits(scene.motion, arm, problems)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.finding import Finding
 
+from .reader import TUBE_LENGTHS
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ _TURN = 2.0 * math.pi  # rad
 _EIGHTH = math.pi / 4.0  # rad; angles that people write in radians are mostly multiples of it
 _CLOSE = 0.003  # of a number, to such a multiple
 _SMALL = 2e-3  # m; a pose in metres that was taken for millimetres is nearer than this
-_TUBES = {"upper_arm": 1, "forearm": 2}  # link -> index of its DH length
 _BEYOND, _BESIDE, _TILT = 0.05, 0.03, math.radians(20.0)  # m, m, rad, by which a sensor may be off its tube
 _OVERLAP = 1e-3  # m
 _ON_TOP = 3e-3  # m; a sensor that is wider by that is meant to lie on the other one
@@ -109,12 +109,12 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     from coneskin.robot.arm.models import arm_model
 
     name = next(known for known, number in LINK_INDEX.items() if number == link_index(link.name))
-    if name not in _TUBES:
+    if name not in TUBE_LENGTHS:
         return
     arm = arm_model(model)
     if arm.name not in MESHED_ARMS and link.frame != "mesh":
         return
-    length = abs(arm.a[_TUBES[name]])
+    length = abs(arm.a[TUBE_LENGTHS[name]])
     room = _ROOM * _tube_distance(arm)
     for item in link.sensors:
         where, cone = f"link {link.name}, {item.sensor.name}", item.sensor.frustum

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import math
 import os
 import sys
 import time
@@ -20,6 +19,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.child_process import inherit
 from coneskin.core.errors import ConeSkinError, MissingExtra
+from coneskin.core.text import finite
 
 if TYPE_CHECKING:
     from .impact_outcome import ImpactMeter
@@ -92,8 +92,7 @@ def main(arguments: list[str]) -> int:
 def _report(program: Channel, meter: ImpactMeter) -> None:
     """Answer the program, which asks what has come of it so far."""
     for _ in program.receive():
-        values = {**asdict(meter.outcome), "began": meter.began}
-        program.send(encode_json({name: None if math.isnan(value) else value for name, value in values.items()}))
+        program.send(encode_json(finite({**asdict(meter.outcome), "began": meter.began})))
 
 
 if __name__ == "__main__":

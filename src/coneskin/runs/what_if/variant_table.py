@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from coneskin.core.text import finite
 from coneskin.runs.export.parquet_file import write_parquet
 
 
@@ -43,14 +44,9 @@ class VariantScore(NamedTuple):
 
     def facts(self) -> dict[str, Any]:
         """Return the score as values for JSON, with units in the names."""
-        milliseconds = {"delay_median_ms": self.delay, "delay_max_ms": self.worst_delay}
-        return {
-            **{name: getattr(self, name) for name in ("variant", "runs", "broken", "changed", "touches", "missed")},
-            "false_alarms": self.false_alarms,
-            "unlabeled": self.unlabeled,
-            **{name: None if math.isnan(value) else 1e3 * value for name, value in milliseconds.items()},
-            "hours": self.hours,
-        }
+        facts = self._asdict()
+        delays = {"delay_median_ms": 1e3 * facts.pop("delay"), "delay_max_ms": 1e3 * facts.pop("worst_delay")}
+        return {**facts, **finite(delays)}
 
 
 def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:

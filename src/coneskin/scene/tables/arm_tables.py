@@ -1,4 +1,8 @@
-"""Readers of the tables of an arm: [arm], [monitoring], [reaction], [motion], [[body]] and [padding]."""
+"""Readers of the tables of an arm: [arm], [monitoring], [reaction], [motion], [[body]] and [padding].
+
+Each takes the tables of the whole file, and adds every mistake to ``problems``. What is not there is None, as is what
+has a mistake.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +36,7 @@ _NEEDED_VALUES = {
 
 
 def read_arm(tables: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
-    """Return the arm; None without one, or with a mistake, which is added to the problems."""
+    """Return the arm."""
     if "arm" not in tables:
         return None
     values = check(tables["arm"], k.ARM_KEYS, "arm", problems)
@@ -62,7 +66,7 @@ def read_monitoring(tables: Mapping[str, Any], problems: list[str]) -> Monitorin
 
 
 def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene | None:
-    """Return the motion; None without one, or with a mistake, which is added to the problems."""
+    """Return the motion."""
     if "motion" not in tables:
         return None
     rows = tables["motion"].get("waypoints_deg")
@@ -82,19 +86,13 @@ def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene |
     return MotionScene(tuple(points), **values) if len(values) == len(k.MOTION_KEYS) - 1 else None
 
 
-def read_reaction(table: Mapping[str, Any], problems: list[str]) -> tuple[Reaction | None, tuple[Rule, ...]]:
-    """Return the reaction of a scene, and its rules in order.
-
-    Args:
-        table: [reaction].
-        problems: every mistake is added here.
-
-    Returns:
-        None for the reaction where it has a mistake; a rule with one is left out.
-    """
+def read_reaction(tables: Mapping[str, Any], problems: list[str]) -> tuple[Reaction | None, tuple[Rule, ...]]:
+    """Return the reaction of a scene, and its rules in order; a rule with a mistake is left out."""
     from coneskin.robot.reaction.types import Reaction
 
-    values = _given(check(table, k.REACTION_KEYS, "reaction", problems))
+    if "reaction" not in tables:
+        return None, ()
+    values = _given(check(tables["reaction"], k.REACTION_KEYS, "reaction", problems))
     rows = values.pop("rule", ())
     reaction = Reaction(**values) if "kind" in values else None
     rules = [_rule(row, f"reaction.rule {n}", reaction or Reaction(), problems) for n, row in enumerate(rows, 1)]
@@ -124,12 +122,7 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def read_bodies(tables: Mapping[str, Any], problems: list[str]) -> tuple[BodyScene, ...]:
-    """Return the bodies of a scene; one with a mistake is left out.
-
-    Args:
-        tables: of the whole file.
-        problems: every mistake is added here.
-    """
+    """Return the bodies of a scene; one with a mistake is left out."""
     rows = check({"body": tables.get("body", [])}, (Key("body", dict, ()),), "scene", problems)["body"]
     found = [_body(row, f"body {number}", problems) for number, row in enumerate(rows, 1)]
     return tuple(body for body in found if body is not None)
@@ -153,12 +146,7 @@ def _body(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyScene 
 
 
 def read_padding(tables: Mapping[str, Any], problems: list[str]) -> Padding | None:
-    """Return the padding of a scene's skins; None where the file names none.
-
-    Args:
-        tables: of the whole file.
-        problems: every mistake is added here.
-    """
+    """Return the padding of a scene's skins; what has a mistake has its default."""
     if "padding" not in tables:
         return None
     from coneskin.skin.materials import Padding

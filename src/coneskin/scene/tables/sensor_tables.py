@@ -1,4 +1,7 @@
-"""Readers of [[link]] and [[link.sensor]] of a scene, and of the sensor file that ``coneskin design`` writes."""
+"""Readers of [[link]] and [[link.sensor]] of a scene, and of the sensor file that ``coneskin design`` writes.
+
+Each adds every mistake to ``problems``. Its messages begin with ``where``, the name of the table.
+"""
 
 from __future__ import annotations
 
@@ -34,10 +37,7 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
     """Return a sensor's table with the keys of its ``file`` added; its own keys take precedence.
 
     Args:
-        table: of the scene.
-        where: name of the table, for messages.
         folder: folder to which a relative ``file`` refers; None where no file may be opened.
-        problems: every mistake is added here.
     """
     own = dict(table)
     if "file" not in own:
@@ -79,16 +79,7 @@ def _apply_calibration(
 
 
 def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> tuple[Sensor, PlacedFrustum] | None:
-    """Build the sensor that a table describes, with its place.
-
-    Args:
-        table: with the keys of SENSOR_KEYS.
-        where: name of the table, for messages.
-        problems: every mistake is added here.
-
-    Returns:
-        the sensor and its placed frustum; None if the table has a mistake.
-    """
+    """Build the sensor that a table with the keys of SENSOR_KEYS describes, and its place; None if it has a mistake."""
     before = len(problems)
     values = check(table, SENSOR_KEYS, where, problems)
     if len(problems) > before:
@@ -234,7 +225,6 @@ def inline_sensor_files(
     Args:
         tables: of the whole scene file; they are changed.
         folder: folder to which paths are relative; None where no file may be opened.
-        problems: every mistake is added here.
         calibrated: False to leave calibrations out.
         changed: True where the tables are others than the text's already.
 
@@ -307,7 +297,6 @@ def read_links(tables: Mapping[str, Any], folder: Path | None, problems: list[st
     Args:
         tables: of the whole file, after ``inline_sensor_files``.
         folder: folder to which the paths of meshes are relative; None if the files need not exist.
-        problems: every mistake is added here.
     """
     check({"link": tables.get("link", [])}, (Key("link", dict, ()),), "scene", problems)
     links: list[LinkScene] = []

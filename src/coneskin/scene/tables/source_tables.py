@@ -20,11 +20,7 @@ if TYPE_CHECKING:
 
 
 def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
-    """Check a [source] table, or several [[source]], and convert them.
-
-    Args:
-        tables: from the file: one table, or a list of them.
-        problems: every mistake is added here.
+    """Check a [source] table, or several [[source]], and convert them; every mistake is added to the problems.
 
     Returns:
         as ``_read_source`` does; of several the kind is ``GROUP`` and ``members`` holds kind and values of each.

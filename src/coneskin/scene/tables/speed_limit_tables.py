@@ -65,7 +65,7 @@ def inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: li
     Args:
         tables: of the whole scene; they are changed.
         folder: folder to which the name is relative; None where no file may be opened.
-        problems: every mistake is added here.
+        problems: to which every mistake is added.
     """
     arm = tables.get("arm")
     if not isinstance(arm, dict) or "speed_limit_from" not in arm:
@@ -120,12 +120,11 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
 
 
 def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None:
-    """Add what stands against the permissible speeds of a scene.
+    """Add what stands against the permissible speeds of a scene to the problems.
 
     Args:
         scene: the whole of it.
         recorded: it comes from a recording, and was checked when the guard began.
-        problems: every mistake is added here.
     """
     from coneskin.robot.arm.kinematics import link_index
 
@@ -162,9 +161,8 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
 
 _MAX_STEEPNESS = 1.05  # of the lever's growth by which a speed may grow; the search leaves 1 %, rounding another
 _ROUNDING_SPEED = 2e-5  # m/s that rounding leaves of two speeds
-_MAX_PATCH_GAP = math.radians(
-    90.0
-)  # between two patches around a sheet; beyond, no factor makes up for what lies between
+#: between two patches around a sheet [rad]; beyond, no factor makes up for what lies between
+_MAX_PATCH_GAP = math.radians(90.0)
 _ROUNDING_SLACK = 1e-7  # m and rad that the rounding of a file leaves
 
 
