@@ -5,6 +5,7 @@
 
 import json
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -227,8 +228,8 @@ def examine(who: str, wires: str) -> dict[str, Any]:
         result: dict[str, Any] = {"said": said, "kept": len(kept), "read": read}
         if read is not None:
             finding, patch = examine_wires(ONE, read)
-            result |= {"finding": finding.as_message(), "patch": patch and list(patch)}
-            result["agrees"] = examine_touches(ONE, kept[:40], kept[40:], 8e-3).as_message()
+            result |= {"finding": asdict(finding), "patch": patch and list(patch)}
+            result["agrees"] = asdict(examine_touches(ONE, kept[:40], kept[40:], 8e-3))
     return result
 
 

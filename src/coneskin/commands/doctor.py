@@ -21,6 +21,7 @@ import json
 import shlex
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
     def tell(finding: Finding) -> None:
         if args.json:
-            print(json.dumps(finding.as_message()), flush=True)
+            print(json.dumps(asdict(finding)), flush=True)
         else:
             verdict = painted(finding.verdict, _VERDICT_COLORS[finding.verdict], sys.stdout)
             print(finding.text.replace(finding.verdict, verdict, 1), flush=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 Verdict = Literal["ok", "warning", "bad", "not tried"]
 
@@ -26,10 +26,6 @@ class Finding:
     value: str
     rule: str = ""
     remedy: str = ""
-
-    def as_message(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
-        return asdict(self)
 
     @property
     def line(self) -> str:

@@ -108,15 +108,6 @@ class ChildProcesses:
         channel.send(encode_json(settings))
         return channel
 
-    def note_script(self) -> None:
-        """Note the script of a virtual skin, once it plays.
-
-        Raises:
-            SkinConnectionError: its process does not answer.
-        """
-        if self.skin is not None:
-            self.skin.note_script()
-
     def end(self, stands: Callable[[], bool]) -> None:
         """End the children, the guard first; may be called again.
 

@@ -14,6 +14,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -146,7 +147,8 @@ class Session:
         try:
             self._open()
             self._await_activation()
-            self._processes.note_script()
+            if self._processes.skin is not None:
+                self._processes.skin.note_script()
         except BaseException:
             self.close()
             if self._made and self.recording is not None and not self._log.activated:
@@ -293,7 +295,7 @@ class Session:
     def _open(self) -> None:
         scene = self.scene
         start: dict[str, Any] = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve())}
-        start["commissioning"] = scene.commissioning.as_message() if scene.commissioning else None
+        start["commissioning"] = asdict(scene.commissioning) if scene.commissioning else None
         if self.recording is None and scene.recording is not None:
             self.recording, self._made = new_recording(scene.recording.folder), True
         virtual = scene.source is not None and scene.source.kind == "virtual"

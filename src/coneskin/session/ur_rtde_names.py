@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import timedelta
-from functools import partial
+from functools import partial, wraps
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,9 +24,8 @@ if TYPE_CHECKING:  # a file of stubs alone, which scripts/reference.py makes fro
 else:
     UrRtdeMethods = object
 
-_SPEED_HOLD_TIME = (
-    0.5  # s for which a speed holds at least; a program of ur_rtde may rely on its lasting until speedStop
-)
+#: s for which a speed holds at least; a program of ur_rtde may rely on its lasting until speedStop
+_SPEED_HOLD_TIME = 0.5
 _SERVO_HOLD_TIME = 0.1  # s for which a position holds at least
 _STEADY_SPEED = 1e-3  # rad/s
 _CYCLE_TIME = 0.002  # s, of the controller
@@ -69,72 +68,73 @@ class _Method(NamedTuple):
     note: str = ""
 
 
+def _true(call: Callable[..., object]) -> Callable[..., bool]:
+    """Return a call that returns True, as most methods of ur_rtde do where nothing stands against them."""
+
+    @wraps(call)
+    def answer(*values: Any, **named: Any) -> bool:
+        call(*values, **named)
+        return True
+
+    return answer
+
+
 # ---- moves
 
 
 def _move_j(
     arm: ArmClient, q: Sequence[Any], speed: float = 1.05, acceleration: float = 1.4, asynchronous: bool = False
-) -> bool:
+) -> None:
     """Move in joint space to positions [rad], in rad/s and rad/s2, or along a path of them."""
     if _is_path(q):
-        return _path(arm, [Waypoint.move_j(p[:6], *p[6:]) for p in q], asynchronous or speed is True)
-    arm.move_j(q, speed, acceleration, wait=not asynchronous)
-    return True
+        arm.move_path([Waypoint.move_j(p[:6], *p[6:]) for p in q], wait=not (asynchronous or speed is True))
+    else:
+        arm.move_j(q, speed, acceleration, wait=not asynchronous)
 
 
 def _move_l(
     arm: ArmClient, pose: Sequence[Any], speed: float = 0.25, acceleration: float = 1.2, asynchronous: bool = False
-) -> bool:
+) -> None:
     """Move the tool straight to a pose [m, rad], in m/s and m/s2, or along a path of them."""
     if _is_path(pose):
-        return _path(arm, [Waypoint.move_l(p[:6], *p[6:]) for p in pose], asynchronous or speed is True)
-    arm.move_l(pose, speed, acceleration, wait=not asynchronous)
-    return True
+        arm.move_path([Waypoint.move_l(p[:6], *p[6:]) for p in pose], wait=not (asynchronous or speed is True))
+    else:
+        arm.move_l(pose, speed, acceleration, wait=not asynchronous)
 
 
 def _move_j_ik(
     arm: ArmClient, pose: Sequence[float], speed: float = 1.05, acceleration: float = 1.4, asynchronous: bool = False
-) -> bool:
+) -> None:
     """Move in joint space to a pose of the tool [m, rad]; speed and acceleration as of ``move_j``."""
     arm.move_j_ik(pose, speed, acceleration, wait=not asynchronous)
-    return True
 
 
 def _move_l_fk(
     arm: ArmClient, q: Sequence[float], speed: float = 0.25, acceleration: float = 1.2, asynchronous: bool = False
-) -> bool:
+) -> None:
     """Move the tool straight to where it is at joint positions [rad]; speed and acceleration as of ``move_l``."""
     arm.move_l_fk(q, speed, acceleration, wait=not asynchronous)
-    return True
 
 
 def _is_path(values: Sequence[Any]) -> bool:
     return len(values) > 0 and isinstance(values[0], Sequence)
 
 
-def _path(arm: ArmClient, waypoints: Sequence[Waypoint], asynchronous: bool = False) -> bool:
-    arm.move_path(waypoints, wait=not asynchronous)
-    return True
-
-
-def _speed_j(arm: ArmClient, qd: Sequence[float], acceleration: float = 0.5, time: float = 0.0) -> bool:
+def _speed_j(arm: ArmClient, qd: Sequence[float], acceleration: float = 0.5, time: float = 0.0) -> None:
     """Move the joints at these speeds [rad/s] for the time [s], or for ``_SPEED_HOLD_TIME`` if that is longer."""
     arm.speed_j(qd, acceleration, max(time, _SPEED_HOLD_TIME))
-    return True
 
 
-def _speed_l(arm: ArmClient, xd: Sequence[float], acceleration: float = 0.25, time: float = 0.0) -> bool:
+def _speed_l(arm: ArmClient, xd: Sequence[float], acceleration: float = 0.25, time: float = 0.0) -> None:
     """Move the tool at this velocity [m/s, rad/s] for the time [s], or for ``_SPEED_HOLD_TIME`` if that is longer."""
     arm.speed_l(xd, acceleration, max(time, _SPEED_HOLD_TIME))
-    return True
 
 
 def _servo_j(
     arm: ArmClient, q: Sequence[float], _speed: float, _acceleration: float, time: float, lookahead: float, gain: float
-) -> bool:
+) -> None:
     """Follow joint positions [rad] for the time [s], or for ``_SERVO_HOLD_TIME`` if that is longer."""
     arm.servo_j(q, max(time, _SERVO_HOLD_TIME), lookahead, gain)
-    return True
 
 
 def _servo_l(
@@ -145,16 +145,14 @@ def _servo_l(
     time: float,
     lookahead: float,
     gain: float,
-) -> bool:
+) -> None:
     """Follow poses of the tool [m, rad] for the time [s], or for ``_SERVO_HOLD_TIME`` if that is longer."""
     arm.servo_l(pose, max(time, _SERVO_HOLD_TIME), lookahead, gain)
-    return True
 
 
-def _stop(arm: ArmClient, a: float = 10.0, asynchronous: bool = False) -> bool:  # noqa: ARG001
+def _stop(arm: ArmClient, a: float = 10.0, asynchronous: bool = False) -> None:  # noqa: ARG001
     """Stop the arm with a deceleration [rad/s2, or m/s2 of the tool]."""
     arm.stop(a)
-    return True
 
 
 def _stop_j(arm: ArmClient, a: float = 2.0, asynchronous: bool = False) -> None:  # noqa: ARG001
@@ -185,16 +183,9 @@ class _AsyncOperationStatus(NamedTuple):
 # ---- set, ask, read
 
 
-def _set_tcp(arm: ArmClient, pose: Sequence[float]) -> bool:
-    """Set the pose of the tool in the flange's frame [m, rad]."""
-    arm.set_tcp(pose)
-    return True
-
-
-def _set_payload(arm: ArmClient, mass: float, cog: Sequence[float] = (0.0, 0.0, 0.0)) -> bool:
+def _set_payload(arm: ArmClient, mass: float, cog: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
     """Set what the arm carries: mass [kg] and its centre in the flange's frame [m]."""
     arm.set_payload(mass, cog)
-    return True
 
 
 def _ask(name: str) -> _Method:
@@ -224,34 +215,20 @@ def _bit(variable: str) -> Callable[[ArmClient, int], bool]:
 
 def _set_digital(group: str) -> _Method:
     """Return the method that switches the digital outputs of a group."""
-
-    def switch(arm: ArmClient, number: int, on: bool) -> bool:
-        arm.outputs.set_digital(number, on, group)
-        return True
-
+    switch = _true(lambda arm, number, on: arm.outputs.set_digital(number, on, group))
     return _Method(switch, f'outputs.set_digital(..., "{group}")')
 
 
 def _set_analog(kind: str) -> _Method:
     """Return the method that sets analog outputs of a kind, as ratios from 0 to 1."""
-
-    def set_ratio(arm: ArmClient, number: int, ratio: float) -> bool:
-        arm.outputs.set_analog(number, ratio, kind)
-        return True
-
+    set_ratio = _true(lambda arm, number, ratio: arm.outputs.set_analog(number, ratio, kind))
     return _Method(set_ratio, f'outputs.set_analog(..., "{kind}")')
 
 
-def _set_register(arm: ArmClient, number: int, value: int) -> bool:
-    """Write a whole number into an input register."""
-    arm.outputs.set_register(number, int(value))
-    return True
-
-
-def _set_double(arm: ArmClient, number: int, value: float) -> bool:
-    """Write a number into an input register."""
-    arm.outputs.set_register(number, float(value))
-    return True
+def _set_register(number_type: type) -> _Method:
+    """Return the method that writes whole numbers, or floats, into input registers."""
+    write = _true(lambda arm, number, value: arm.outputs.set_register(number, number_type(value)))
+    return _Method(write, "outputs.set_register")
 
 
 def _init_period(_: ArmClient) -> timedelta:
@@ -295,27 +272,27 @@ _STOP_NOTE = "each kind of motion has its own stop, whichever is called"
 #: name in ur_rtde -> what answers it
 NAMES: Mapping[str, _Method] = MappingProxyType(
     {
-        "moveJ": _Method(_move_j, "move_j, move_path"),
-        "moveJ_IK": _Method(_move_j_ik, "move_j_ik"),
-        "moveL": _Method(_move_l, "move_l, move_path"),
-        "moveL_FK": _Method(_move_l_fk, "move_l_fk"),
-        "speedJ": _Method(_speed_j, "speed_j", _SPEED_NOTE),
-        "speedL": _Method(_speed_l, "speed_l", _SPEED_NOTE),
-        "servoJ": _Method(_servo_j, "servo_j", _SERVO_NOTE),
-        "servoL": _Method(_servo_l, "servo_l", _SERVO_NOTE),
-        "speedStop": _Method(_stop, "stop", _STOP_NOTE),
-        "servoStop": _Method(_stop, "stop", _STOP_NOTE),
+        "moveJ": _Method(_true(_move_j), "move_j, move_path"),
+        "moveJ_IK": _Method(_true(_move_j_ik), "move_j_ik"),
+        "moveL": _Method(_true(_move_l), "move_l, move_path"),
+        "moveL_FK": _Method(_true(_move_l_fk), "move_l_fk"),
+        "speedJ": _Method(_true(_speed_j), "speed_j", _SPEED_NOTE),
+        "speedL": _Method(_true(_speed_l), "speed_l", _SPEED_NOTE),
+        "servoJ": _Method(_true(_servo_j), "servo_j", _SERVO_NOTE),
+        "servoL": _Method(_true(_servo_l), "servo_l", _SERVO_NOTE),
+        "speedStop": _Method(_true(_stop), "stop", _STOP_NOTE),
+        "servoStop": _Method(_true(_stop), "stop", _STOP_NOTE),
         "stopJ": _Method(_stop_j, "stop", f"never asynchronous; {_STOP_NOTE}"),
-        "stopL": _Method(_stop, "stop", f"never asynchronous; {_STOP_NOTE}"),
-        "stopScript": _Method(_stop, "stop", "stops the arm; the session ends the program on the controller"),
+        "stopL": _Method(_true(_stop), "stop", f"never asynchronous; {_STOP_NOTE}"),
+        "stopScript": _Method(_true(_stop), "stop", "stops the arm; the session ends the program on the controller"),
         "getAsyncOperationProgress": _Method(_progress, "progress"),
         "getAsyncOperationProgressEx": _Method(
             lambda arm: _AsyncOperationStatus(arm.progress()),
             "progress",
             "isAsyncOperationRunning and progress alone",
         ),
-        "setTcp": _Method(_set_tcp, "set_tcp", "while the arm stands"),
-        "setPayload": _Method(_set_payload, "set_payload", "while the arm stands"),
+        "setTcp": _Method(_true(ArmClient.set_tcp), "set_tcp", "while the arm stands"),
+        "setPayload": _Method(_true(_set_payload), "set_payload", "while the arm stands"),
         **{name: _ask(name) for name in _ASKED_NAMES},
         "isSteady": _Method(_is_steady, "states.reading().speed", f"no joint faster than {_STEADY_SPEED:g} rad/s"),
         "isProgramRunning": _Method(
@@ -345,8 +322,8 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         "setToolDigitalOut": _set_digital("tool"),
         "setAnalogOutputVoltage": _set_analog("voltage"),
         "setAnalogOutputCurrent": _set_analog("current"),
-        "setInputIntRegister": _Method(_set_register, "outputs.set_register"),
-        "setInputDoubleRegister": _Method(_set_double, "outputs.set_register"),
+        "setInputIntRegister": _set_register(int),
+        "setInputDoubleRegister": _set_register(float),
         "initPeriod": _Method(_init_period, "time.monotonic"),
         "waitPeriod": _Method(_wait_period, "time.sleep", "periods of 2 ms"),
         "isConnected": _Method(lambda arm: arm.connected, "connected"),
@@ -365,16 +342,27 @@ _PROGRAM_REASON = (
     "a program on the controller would replace the one that the guard stops; run it with control = external, where the "
     "guard stops whatever runs"
 )
-_WATCHDOG_REASON = "the driver process keeps the controller's watchdog (arm.watchdog_hz); leave the call out"
-_CONTACT_REASON = (
-    "a touch that the controller notices by its motors' currents comes long after the skin's; leave the call out"
-)
-_RESTART_REASON = (
-    "a connection that is gone has stopped the arm, and a person has to look: end the session and start a new one"
-)
-_RECORDING_REASON = (
-    "the session records all that it hears; for more, use an RTDEReceiveInterface beside the guard: it only reads"
-)
+#: why methods are refused that need more words or are several, and what to do -> their names in ur_rtde
+_SHARED_REASONS = {
+    _FORCE_REASON: "forceMode freedriveMode teachMode",
+    "there is no force mode to set up: leave the call out": "forceModeSetDamping forceModeSetGainScaling",
+    "a touch that the controller notices by its motors' currents comes long after the skin's; leave the call out": (
+        "startContactDetection stopContactDetection readContactDetection toolContact"
+    ),
+    f"it changes what the controller's own safety system may rely on; {_BY_HAND}": (
+        "zeroFtSensor enableExternalFtSensor ftRtdeInputEnable setExternalForceTorque"
+    ),
+    "the driver process keeps the controller's watchdog (arm.watchdog_hz); leave the call out": (
+        "setWatchdog kickWatchdog"
+    ),
+    _PROGRAM_REASON: "sendCustomScript sendCustomScriptFile sendCustomScriptFunction setCustomScriptFile",
+    "a connection that is gone has stopped the arm, and a person has to look: end the session and start a new one": (
+        "reconnect"
+    ),
+    "the session records all that it hears; for more, use an RTDEReceiveInterface beside the guard: it only reads": (
+        "startFileRecording stopFileRecording"
+    ),
+}
 
 #: name in ur_rtde -> why it is refused, and what to do
 REFUSALS: Mapping[str, str] = MappingProxyType(
@@ -385,37 +373,16 @@ REFUSALS: Mapping[str, str] = MappingProxyType(
         "jogStart": "it moves on without an end if the program hangs: call speedL in a loop",
         "jogStop": "there is no jogging to stop: call stop",
         "directTorque": f"it moves the arm by torques alone; {_FORCE_REASON}",
-        "forceMode": _FORCE_REASON,
         "forceModeStop": "there is no force mode to stop: leave the call out",
-        "forceModeSetDamping": "there is no force mode to set up: leave the call out",
-        "forceModeSetGainScaling": "there is no force mode to set up: leave the call out",
-        "freedriveMode": _FORCE_REASON,
         "endFreedriveMode": "there is no freedrive to end: leave the call out",
         "getFreedriveStatus": "there is no freedrive: leave the call out",
-        "teachMode": _FORCE_REASON,
         "endTeachMode": "there is no teach mode to end: leave the call out",
-        "startContactDetection": _CONTACT_REASON,
-        "stopContactDetection": _CONTACT_REASON,
-        "readContactDetection": _CONTACT_REASON,
-        "toolContact": _CONTACT_REASON,
-        "zeroFtSensor": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
-        "enableExternalFtSensor": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
-        "ftRtdeInputEnable": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
-        "setExternalForceTorque": f"it changes what the controller's own safety system may rely on; {_BY_HAND}",
         "setGravity": "it follows from how the arm is mounted: set it in the controller's installation",
         "setTargetPayload": "it changes the payload while the arm moves: call setPayload while it stands",
         "setSpeedSlider": "the slider is a stop path of the guard: scale the speeds of the program",
-        "setWatchdog": _WATCHDOG_REASON,
-        "kickWatchdog": _WATCHDOG_REASON,
         "triggerProtectiveStop": "only a person can unlock one: call stop, or end the session",
-        "sendCustomScript": _PROGRAM_REASON,
-        "sendCustomScriptFile": _PROGRAM_REASON,
-        "sendCustomScriptFunction": _PROGRAM_REASON,
-        "setCustomScriptFile": _PROGRAM_REASON,
         "reuploadScript": f"after a stop session.reset() starts it, because a person has looked; {_PROGRAM_REASON}",
-        "reconnect": _RESTART_REASON,
-        "startFileRecording": _RECORDING_REASON,
-        "stopFileRecording": _RECORDING_REASON,
+        **{name: why for why, names in _SHARED_REASONS.items() for name in names.split()},
         "unlockProtectiveStop": "no protective stop is ever unlocked by a program: a person does it on the pendant",
     }
 )

@@ -255,13 +255,9 @@ class Commissioning:
     valid: bool
     note: str
 
-    def as_message(self) -> dict[str, Any]:
-        """Return it as JSON has it, for another process or a recording."""
-        return {"valid": self.valid, "note": self.note}
-
     @classmethod
     def from_message(cls, message: Any) -> Commissioning | None:
-        """Return what ``as_message`` made of it; None for None.
+        """Return what another process or a recording says of it: ``asdict`` of one, None for None.
 
         Raises:
             ValueError: the message is nothing of the kind.
