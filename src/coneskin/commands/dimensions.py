@@ -25,11 +25,9 @@ def add_key_options(
     required: Collection[str] = (),
     defaults: Mapping[str, str] | None = None,
 ) -> None:
-    """Declare an option for each of some keys.
+    """Declare an option for each of some keys, with the ``add_argument`` of a parser or of a group.
 
     Args:
-        add: the ``add_argument`` of a parser or of a group.
-        keys: numbers.
         required: plain names of those that must be given.
         defaults: plain name -> what holds where the option is missing, in words.
     """
@@ -67,7 +65,6 @@ def given_keys(args: argparse.Namespace, keys: Sequence[Key]) -> dict[str, float
 
     Args:
         args: parsed; options that the command does not have, or that were not given, are left out.
-        keys: numbers, with their ranges.
 
     Raises:
         GeometryError: one is out of range; where it looks like metres, the message says what it would be in mm.

@@ -63,14 +63,7 @@ def _find_port(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> PortFacts:
-    """Watch the list of ports until one has come.
-
-    Args:
-        look: returns the ports that are there.
-        say: tells the person what to do, and what has happened.
-        timeout: longest time to wait [s].
-        clock: the time [s].
-        sleep: lets time pass [s].
+    """Watch the list of ports for a time [s] until one has come, and tell the person what to do.
 
     Raises:
         SkinTimeout: none has come.

@@ -122,8 +122,6 @@ def _each(
     """Do a job for each run, print its line, or all rows as one JSON object, and return the rows.
 
     Args:
-        args: with ``json``.
-        paths: of the runs.
         job: returns the row and the line of a run.
         failed: begins what is said of a run for which it raises; its row has an ``error``.
     """

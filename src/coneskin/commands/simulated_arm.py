@@ -24,7 +24,6 @@ def simulated_arm(scene: Scene, bodies: bool = False) -> Iterator[socket.socket 
     """Run a simulated controller of the scene's arm at its host; it starts where the scene's motion does.
 
     Args:
-        scene: with an arm.
         bodies: let the arm meet the scene's bodies, if there are any, in the physics engine.
 
     Yields:

@@ -25,13 +25,10 @@ if TYPE_CHECKING:
 
 
 def print_hint(text: str) -> None:
-    """Print a line with a command, unless what is pasted would be another one.
+    """Print a line with a command, file names quoted for a shell, unless what is pasted would be another one.
 
     Where the terminal's encoding lacks a letter of a file's name, the letter is written out as an escape; a control
     character in a name is one, too. No shell reads either as the file, so the line is left out.
-
-    Args:
-        text: the line; its file names are quoted for a shell.
     """
     try:
         text.encode(sys.stdout.encoding or "ascii")
@@ -107,12 +104,7 @@ def add_page_options(parser: argparse.ArgumentParser, port: int) -> None:
 
 
 def show_page(args: argparse.Namespace, url: str, words: str) -> threading.Event:
-    """Say where a page is, and open it in a browser, as the options want it.
-
-    Args:
-        args: with ``json``, ``no_browser`` and ``duration_s``.
-        url: of the page.
-        words: for people, with a place for the address.
+    """Say where a page is, in words with a place for the address, and open it in a browser, as the options want it.
 
     Returns:
         the event that SIGTERM or the end of the time sets.

@@ -42,7 +42,6 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
     holds for it as for this process.
 
     Args:
-        module: the module to run.
         ends: sockets for the child, closed here afterwards.
 
     Raises:
@@ -178,7 +177,6 @@ def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Chann
     """Return the channels that ``spawn`` gave to this process, and the line to its parent.
 
     Args:
-        arguments: the command-line arguments of this process, without its name.
         parent: position of the channel to the parent.
     """
     if arguments == ["shared"]:

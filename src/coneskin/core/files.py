@@ -43,11 +43,7 @@ def explain_os_error(refusal: Callable[[str], ConeSkinError], what: str, hint: s
 
 
 def read_file(path: Path, limit: int) -> bytes:
-    """Return the content of a file.
-
-    Args:
-        path: the file; a link is followed.
-        limit: its largest length [bytes].
+    """Return the content of a file of at most so many bytes; a link is followed.
 
     Raises:
         OSError: as of ``open_file``; or it has grown beyond the limit meanwhile.
@@ -60,11 +56,7 @@ def read_file(path: Path, limit: int) -> bytes:
 
 
 def open_file(path: Path, limit: int) -> BinaryIO:
-    """Open a regular file for reading, without waiting for anything.
-
-    Args:
-        path: the file; a link is followed.
-        limit: its largest length [bytes], as it is now.
+    """Open a regular file of at most so many bytes for reading, without waiting for anything; a link is followed.
 
     Raises:
         OSError: it is not there, or may not be read; it is a folder, a device, a pipe or a socket; it is too long.

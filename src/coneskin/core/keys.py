@@ -152,9 +152,7 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
     """Check a table and convert its values to SI.
 
     Args:
-        table: from the file.
         keys: keys that it may have.
-        where: name of the table, for messages.
         problems: every mistake is added here.
 
     Returns:

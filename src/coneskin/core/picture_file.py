@@ -34,12 +34,7 @@ def picture_style() -> Iterator[None]:
 
 
 def degree_ticks(axis: Any, span: float) -> None:
-    """Set the ticks of an axis of degrees at every 45 or 90 of them.
-
-    Args:
-        axis: of matplotlib.
-        span: of the axis [deg].
-    """
+    """Set the ticks of an axis of matplotlib at every 15, 45 or 90 degrees, by its span [deg]."""
     from matplotlib.ticker import MultipleLocator
 
     axis.set_major_locator(MultipleLocator(90.0 if span > 200.0 else 45.0 if span > 60.0 else 15.0))

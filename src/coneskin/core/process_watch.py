@@ -16,12 +16,7 @@ _MAX_SHARE: Final = 0.2  # of the time between two looks; a thread that has run 
 
 
 class ProcessWatch:
-    """Watch over one process.
-
-    Args:
-        pid: its number.
-        folder: where the system tells of processes.
-    """
+    """Watch over one process, by its number in the folder where the system tells of processes."""
 
     def __init__(self, pid: int, folder: Path = Path("/proc")) -> None:
         self._folder = folder / str(pid)
@@ -40,11 +35,7 @@ class ProcessWatch:
             return False
 
     def waits(self, now: float) -> bool:
-        """Tell whether a thread of it has waited for a processor, or for the disk, since the last look.
-
-        Args:
-            now: monotonic [s].
-        """
+        """Tell whether a thread of it has waited for a processor or the disk since the last look, at times [s]."""
         before, self._ran = self._ran, {}
         since, self._looked_at = self._looked_at, now
         try:

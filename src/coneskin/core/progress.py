@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-Progress = Callable[[float], None]  #: takes the fraction that is done, from 0 to 1
+Progress = Callable[[float], None]  #: called now and then with the fraction that is done, from 0 to 1
 
 
 def silent(fraction: float) -> None:
@@ -20,13 +20,7 @@ _DRAWING_PERIOD = 0.2  # s between two drawings
 
 
 class ProgressBar:
-    """Bar that is drawn on a terminal only, in one line; call it with the fraction that is done.
-
-    Args:
-        what: is done.
-        stream: to draw on.
-        clock: monotonic seconds.
-    """
+    """Bar that is drawn on a terminal only, in one line; call it with the fraction that is done."""
 
     def __init__(self, what: str, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._what = what

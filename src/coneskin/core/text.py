@@ -59,13 +59,7 @@ def finite(value: Any) -> Any:
 
 
 def painted(text: str, color: str, stream: TextIO) -> str:
-    """Return a text in a colour where the stream is a terminal, and NO_COLOR (no-color.org) is empty or not set.
-
-    Args:
-        text: to be printed.
-        color: red, green, yellow or blue.
-        stream: on which it is printed.
-    """
+    """Return a text in red, green, yellow or blue on a terminal, but not where NO_COLOR (no-color.org) says so."""
     if os.environ.get("NO_COLOR") or not stream.isatty():
         return text
     return f"\033[{_COLOR_CODES[color]}m{text}\033[0m"

@@ -142,15 +142,10 @@ class Comparison:
 
 
 def compare_decisions(one: Decisions, other: Decisions, tolerances: Tolerances | None = None) -> Comparison:
-    """Compare two guards' decisions.
+    """Compare two guards' decisions, the first of which is the reference, but for what the tolerances leave out.
 
     The other's times are first put on the clock of the first. Where the two are about the same recording, by their
     start, they stay; else the first contacts (or the starts) coincide.
-
-    Args:
-        one: the reference.
-        other: what is compared with it.
-        tolerances: what does not count.
     """
     tolerances, shift = tolerances or Tolerances(), _shift(one, other)
     until = min(one.until, other.until + shift)
@@ -188,7 +183,6 @@ def without_invented(decisions: Decisions, recorded: Decisions) -> Decisions:
     """Return decisions without what they say of an arm that moved otherwise than they commanded.
 
     Args:
-        decisions: of a replay.
         recorded: of the guard that moved the arm; both have commands.
     """
     assert decisions.commands is not None

@@ -100,13 +100,10 @@ def cut_run(
     """Write the part of a run around a moment as a recording of its own.
 
     Args:
-        run: the whole run.
-        target: the file to make.
         around: the moment [s since the start of the run].
         keep: how much of it [s]: half before the moment, and as much as a guard needs to become active, half after it.
             None: 1 s, begun as much earlier as it takes until the contacts are those of the whole run.
         name: of the whole run, for the new one's header.
-        progress: called now and then with the fraction that is done.
 
     Raises:
         RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole

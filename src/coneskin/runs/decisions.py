@@ -90,13 +90,7 @@ def _command_in(payload: bytes, time: float) -> _ArmCommand:
 def first_divergence(
     one: Sequence[_ArmCommand], other: Sequence[_ArmCommand], tolerances: Tolerances | None = None
 ) -> float:
-    """Return from when on two guards command otherwise [s]; infinite where they do not.
-
-    Args:
-        one: commands of a guard.
-        other: of another that was given the same inputs, or the same guard in a replay.
-        tolerances: what does not count.
-    """
+    """Return from when on two guards command otherwise on the same inputs [s]; infinite where they do not."""
     tolerances = tolerances or Tolerances()
     for a, b in zip(one, other, strict=False):
         if not a.equals(b, tolerances):
@@ -224,11 +218,9 @@ def decide_again(
     """Give a run's inputs to a new guard of today's code and return what it decides.
 
     Args:
-        run: the recorded run.
         settings: values to set in the scene first, such as ``{"reaction.kind": "stop"}``.
         label: for people; by default the settings.
         scene: another scene than the run's own; no setting changes it.
-        progress: called now and then with the fraction of a run in a file that is done.
 
     Raises:
         SceneError: the scene cannot be read or built with these settings.

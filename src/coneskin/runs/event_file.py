@@ -33,12 +33,10 @@ def event_facts(events: Iterable[GuardEvent], start: float) -> list[dict[str, An
 
 
 def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
-    """Return the events of a guard in values from JSON; those of the session around it are left out.
+    """Return the events of a guard in ``{"events": [{"t": ..., "name": ..., ...}]}``, without those of the session.
 
     Args:
-        facts: ``{"events": [{"t": ..., "name": ..., ...}]}``.
         start: host time of their zero [s].
-        where: for messages.
 
     Raises:
         RecordingError: the values are nothing of the kind.
@@ -135,7 +133,6 @@ def decide_with(python: Path, recording: Path, reference: Decisions) -> Decision
 
     Args:
         python: the interpreter of an environment in which that version is installed.
-        recording: the run.
         reference: decisions in the same run, for its start and for what it has lost.
 
     Raises:

@@ -76,11 +76,6 @@ def summarise_run(path: Path, run: Run, progress: Progress = silent) -> dict[str
     ``commissioned`` says why the arm may move away or only stops, ``blocks`` how many there are of each kind, and
     ``cut`` what the run was cut from.
 
-    Args:
-        path: of its recording, or its folder.
-        run: as it was read.
-        progress: called now and then with the fraction that is done.
-
     Raises:
         SceneError: this version of coneskin cannot read its scene.
         RecordingError: an event cannot be read.

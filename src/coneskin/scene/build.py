@@ -35,7 +35,6 @@ def build_core(
     """Build the guard's core for a scene; the same for the live guard and for a replay.
 
     Args:
-        scene: what is guarded.
         placed: its sensors, as of ``place_on_arm``; None to place them.
         detector: other values than the default ones for fields of ``DetectorSettings``; in a what-if only.
 
@@ -186,12 +185,7 @@ class SensorOnArm:
         return (self.surface or self.frustum).point(u, phi), self.frustum.normal(phi)
 
     def place_in_base(self, u: float, phi: float, q: Sequence[float]) -> tuple[Vector, Vector]:
-        """Return point [m] and outward unit normal in the arm's base frame.
-
-        Args:
-            u: slant distance from end 1 [m].
-            phi: azimuth [rad].
-            q: joint positions [rad].
+        """Return point [m] and outward unit normal at u [m] and phi [rad] in the base frame, at joint angles q [rad].
 
         Raises:
             KinematicsError: the scene has no arm.
@@ -209,7 +203,6 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
     """Return the places of the scene's sensors on its arm.
 
     Args:
-        scene: with the sensors.
         surfaces: heights of the links' meshes below the sensors, by their names, as a recording carries them; None to
             measure them on the mesh files.
 

@@ -49,7 +49,6 @@ def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
     """Read a scene from a TOML file (docs/look-up/scene.md).
 
     Args:
-        path: of the file.
         calibrated: False to leave the calibrations of its sensors out.
 
     Raises:
@@ -78,8 +77,6 @@ def parse_scene(
     """Read a scene from its text.
 
     Args:
-        text: TOML.
-        name: for the messages.
         folder: where relative paths start.
         recorded: the text comes from a recording: no file that it names is looked for or opened.
         calibrated: False to leave the calibrations of its sensors out.

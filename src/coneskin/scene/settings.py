@@ -242,7 +242,6 @@ def changed_settings(recorded: Any, scene: Scene) -> list[str]:
 
     Args:
         recorded: settings as a recording has them; what it does not have is not compared.
-        scene: the same scene, as it was read today.
     """
     return list(_changes("", recorded, resolved_settings(scene))) if isinstance(recorded, Mapping) else []
 

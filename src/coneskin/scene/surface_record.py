@@ -19,12 +19,7 @@ _MAX_NODES = 2048  # of a grid, along and around; ``build`` makes 65 x 129
 
 
 def encode_surfaces(placed: Iterable[SensorOnArm], time: float) -> list[Block]:
-    """Return a block for each sensor that lies on a mesh.
-
-    Args:
-        placed: the sensors, as the guard uses them.
-        time: host clock [s].
-    """
+    """Return a block, with a host time [s], for each sensor that lies on a mesh."""
     from coneskin.core.recording.block import Block
     from coneskin.robot.guard.signals.journal import BlockKind
 
@@ -39,10 +34,7 @@ def encode_surfaces(placed: Iterable[SensorOnArm], time: float) -> list[Block]:
 
 
 def decode_surfaces(blocks: Iterable[Block]) -> dict[str, Floats]:
-    """Return the heights of the meshes [m] by the names of the sensors.
-
-    Args:
-        blocks: of a recording, of any kind.
+    """Return the heights of the meshes [m] by the names of the sensors, from a recording's blocks of any kind.
 
     Raises:
         RecordingError: a block of this kind holds no grid of finite heights.

@@ -26,7 +26,6 @@ class _ArmRequests:
     """Requests to one driver process.
 
     Args:
-        channel: to the driver process.
         check: raises what has stopped the arm, if anything has; its argument is True where something certainly has.
     """
 
@@ -114,10 +113,6 @@ class _ArmOutputs:
     """Digital and analog outputs, and the registers for users.
 
     After a touch a gripper must not go on either: whatever is set here is refused until a person has reset the guard.
-
-    Args:
-        writer: to the controller, open.
-        check: raises what has stopped the arm, if anything has.
     """
 
     def __init__(self, writer: OutputWriter, check: Callable[[bool], None]) -> None:
@@ -142,13 +137,7 @@ class _ArmOutputs:
         self._writer.set_digital(group, number, on)
 
     def set_analog(self, number: int, ratio: float, kind: str = "voltage") -> None:
-        """Set an analog output, 0 or 1, to a ratio of its range, 0 to 1; all else as ``set_digital``.
-
-        Args:
-            number: 0 or 1.
-            ratio: of its range, 0 to 1.
-            kind: "voltage" or "current".
-        """
+        """Set an analog output, 0 or 1, "voltage" or "current", to a ratio of its range, 0 to 1; as ``set_digital``."""
         self._check(False)
         self._writer.set_analog(number, ratio, kind)
 
@@ -218,9 +207,6 @@ class ArmClient:
         """Move in joint space to q [rad], with speed [rad/s] and acceleration [rad/s2] of the leading joint.
 
         Args:
-            q: six joint positions [rad].
-            speed: of the leading joint [rad/s].
-            acceleration: of the leading joint [rad/s2].
             wait: return when the arm is there; otherwise at once.
 
         Raises:
@@ -340,11 +326,7 @@ class ArmClient:
         self._do(do="set_tcp", pose=_six(pose, "pose", "m and rad"))
 
     def set_payload(self, mass: float, centre: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Set what the arm carries while it stands.
-
-        Args:
-            mass: [kg].
-            centre: of gravity in the flange's frame [m].
+        """Set what the arm carries while it stands: mass [kg], and centre of gravity in the flange's frame [m].
 
         Raises:
             RobotRefused: as ``set_tcp``.

@@ -57,7 +57,6 @@ class ChildProcesses:
         """Start the processes that a scene needs, all at once, and return the channel to the guard.
 
         Args:
-            scene: with a source, and perhaps an arm.
             start: the scene's text, name and folder, which the children read it from.
             note_truth: is told with what a virtual skin is touched; see ``SkinClient``.
             pressed_by: line from what presses the virtual skin.

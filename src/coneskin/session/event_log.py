@@ -303,9 +303,7 @@ class _HeardLine:
         """Return what is wrong with the line, where a guard waits for its skin.
 
         Args:
-            scene: with the sensors and their source.
             reasons: why the guard waits or refuses; those of a sensor begin with its name.
-            now: host clock [s].
 
         Returns:
             a sentence; empty where the reasons are others, and where frames come as they should.

@@ -29,10 +29,9 @@ def _event_message(event: GuardEvent, began: float) -> bytes:
 
 
 class EventPublisher:
-    """Publisher to one address.
+    """Publisher to one address, ``udp://HOST:PORT``.
 
     Args:
-        url: ``udp://HOST:PORT``.
         beyond: True to allow a host that is not this computer: whoever is on its network can read the events.
 
     Attributes:
@@ -68,12 +67,7 @@ class EventPublisher:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
 
     def publish(self, event: GuardEvent, began: float) -> None:
-        """Send an event, or drop it; it never waits and never raises.
-
-        Args:
-            event: to be sent.
-            began: when the run began, on the clock of the events [s].
-        """
+        """Send an event, or drop it; times count from when the run began [s]. It never waits and never raises."""
         try:
             self._socket.sendto(_event_message(event, began), self._address)
         except (OSError, ValueError, TypeError):

@@ -27,8 +27,6 @@ class GuardMonitor:
     """Monitor of one guard, from a thread of its own, until the guard's channel ends.
 
     Args:
-        log: takes what the guard reports.
-        channel: the guard's.
         watchdogs: channels of the guard watchdogs, which hold the arm at standstill without a guard.
         describe_line: says what is wrong with the skin's line, given why the guard waits; empty where nothing is.
 

@@ -37,13 +37,7 @@ def _arm_lock(
     wait: Callable[[float], None] = time.sleep,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[None]:
-    """Lock the arm of one controller; on Linux alone.
-
-    Args:
-        host: the controller.
-        timeout: how long another guard may take to end [s].
-        wait: waits for this time [s].
-        clock: monotonic seconds.
+    """Lock the arm of one controller, which another guard may take a time [s] to leave; on Linux alone.
 
     Raises:
         RobotRefused: another guard of this computer has the arm.
@@ -100,12 +94,8 @@ def run_guard(
     """Open what a scene names, and guard it until the guard is to end.
 
     Args:
-        scene: with a source, and perhaps an arm.
         start: what the program has said; it names the port.
-        session: channel to the program.
         others: those to the driver process, or to the guard watchdogs; none without an arm.
-        lifeline: to the program.
-        stack: takes what is open.
 
     Raises:
         ConeSkinError: something cannot be opened, or is not what the scene says.

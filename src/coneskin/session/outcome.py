@@ -47,7 +47,6 @@ def await_outcome(log: EventLog, since: int, standstill_time: float) -> str:
     """Return the outcome of the newest stop, as far as it is known in time.
 
     Args:
-        log: of the run, with a stop in it.
         since: position of the first event that counts.
         standstill_time: time in which the arm comes to a confirmed standstill [s].
     """
@@ -69,7 +68,6 @@ def stop_error(
     """Return the error for a stop.
 
     Args:
-        stop: the event of the stop.
         contact: the event that says where the touch is, if there is one.
         outcome: STANDS, STILL_RETREATING or NOT_CONFIRMED.
         reaction: what the reaction did, as the event "latched" says it; empty where that is not known.
@@ -94,7 +92,6 @@ def activation_error(
     """Return the error of a guard that has not become active, with all that stood against it.
 
     Args:
-        events: of the run.
         describe_line: says what is wrong with the skin's line, given the reasons.
     """
     waiting = next((event for event in reversed(events) if event.name == EventName.WAITING), None)
@@ -136,7 +133,6 @@ def exit_code(events: Sequence[GuardEvent], arm: bool) -> int:
     """Return the exit code of a guarded run: 0 nothing has happened, 1 a fault, 3 a collision.
 
     Args:
-        events: of the run.
         arm: whether the scene has one; without one a touch counts as a collision.
     """
     on_purpose = {event.details["what"] for event in events if event.name == EventName.ENDING}

@@ -36,7 +36,6 @@ def prune_run(path: Path, around: float = AROUND, progress: Progress = silent) -
     Args:
         path: a recording, or the folder of a run with one in it.
         around: time before and after such an event in which all stays [s].
-        progress: called now and then with the fraction of the files that is scanned.
 
     Returns:
         bytes before and after.

@@ -26,7 +26,6 @@ class SkinClient:
 
     Args:
         start: the scene's text, name and folder.
-        sensors: of the scene, in its order.
         note_truth: is told each touch: ``touches``, a list of their ``sensor``, ``start``, ``end`` [s, host clock; None
             for one without an end], ``u`` [m], ``phi`` [rad], ``force`` [N] and ``radius`` [m]; or ``released``, when
             all that touches was taken away [s].

@@ -231,10 +231,8 @@ class _Holes:
         """Return the hole that damaged bytes stand in; None where they stand in none.
 
         Args:
-            damage: the bytes.
             before: the number that would follow the chunk before them.
             after: the number of the chunk after them.
-            run: number of the recording.
         """
         number = _number(damage, run)
         if number < 0:
@@ -245,12 +243,7 @@ class _Holes:
 
 
 def encode_drop(time: float, defect: Defect) -> Block:
-    """Return the note of what was dropped.
-
-    Args:
-        time: of the note [s, host clock].
-        defect: its extent.
-    """
+    """Return the note of what was dropped, the extent of a defect, written at a time [s, host clock]."""
     facts = {
         "since": defect.since,
         "until": defect.until,

@@ -115,11 +115,7 @@ def parts_of(path: Path) -> list[Path]:
 
 
 def read_recording(path: Path, progress: Progress = silent) -> Recording:
-    """Read a recording, whole or torn, with all of its files.
-
-    Args:
-        path: its first file.
-        progress: called now and then with the fraction that is scanned.
+    """Read a recording, whole or torn, with all of its files, by the path of the first.
 
     Raises:
         RecordingError: there is no such file, it is no recording, it is too large, or an intact chunk

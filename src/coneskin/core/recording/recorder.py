@@ -79,11 +79,7 @@ class Recorder:
         self.close()
 
     def write(self, *blocks: Block, flush: bool = False) -> None:
-        """Append blocks.
-
-        Args:
-            blocks: what was recorded.
-            flush: hand all that was collected to the operating system at once.
+        """Append blocks; with ``flush``, hand all that was collected to the operating system at once.
 
         Raises:
             RecordingError: the recording is closed, or the disk does not take them.

@@ -88,13 +88,7 @@ class Extent:
 
 
 def walk(file: BinaryIO, at: int, size: int) -> Iterator[Chunk | Damage]:
-    """Yield every intact chunk of a file, and every stretch of bytes between them.
-
-    Args:
-        file: open for reading.
-        at: offset of the first chunk.
-        size: of the file [bytes].
-    """
+    """Yield every intact chunk of a file from an offset on, and every stretch of bytes between them, up to its size."""
     budget = size  # of bytes read twice: heads may be made to name long bodies that are none
     file.seek(at)
     while at < size:

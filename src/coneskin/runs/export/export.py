@@ -100,10 +100,8 @@ def export_run(run: Run, target: Path, form: str | None = None, progress: Progre
     """Write a run for other programs.
 
     Args:
-        run: the run.
         target: csv, parquet: folder for one file for each table; it is made. npz, mcap: the file.
         form: one of ``FORMATS``; None: as the target's name ends, else csv.
-        progress: called now and then with the fraction of the skin's frames that is done.
 
     Returns:
         file -> its number of rows or messages.

@@ -32,10 +32,6 @@ _IDENTIFIER_FIELDS = frozenset({"length", "device", "sensor", "status", "clock_u
 def table_pieces(run: Run, progress: Progress = silent) -> dict[str, Pieces]:
     """Return the tables of a run by their names, in pieces that are read one after the other.
 
-    Args:
-        run: the run.
-        progress: called now and then with the fraction of the skin's frames that is done.
-
     Raises:
         SceneError: this version of coneskin cannot read the scene.
     """

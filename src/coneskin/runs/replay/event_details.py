@@ -140,9 +140,6 @@ def describe_differences(
     What only follows from another difference is left out: the point where u or phi has moved, numbers and stamps.
 
     Args:
-        one: details of an event.
-        other: of the one that stands for it.
-        tolerances: what does not count.
         all_of_them: True for those, too.
     """
     found: dict[str, str] = {}
@@ -251,13 +248,7 @@ def _text(quantity: _Quantity, value: float) -> str:
 
 
 def event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:
-    """Yield a line for each event that is not the same, bit by bit, or has no partner.
-
-    Args:
-        recorded: events of the recording.
-        replayed: of the replay, in the same order.
-        start: host time that counts as 0 [s].
-    """
+    """Yield a line for each event that is not the same, bit by bit, or has no partner; times count from start [s]."""
     bits = [_bits(event) for event in recorded], [_bits(event) for event in replayed]
     if bits[0] == bits[1]:
         return

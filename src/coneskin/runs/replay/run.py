@@ -202,14 +202,7 @@ class Run:
         kinds: frozenset[int] = ALL_KINDS,
         progress: Progress = silent,
     ) -> Iterator[Block]:
-        """Yield blocks of a time and of kinds; what is outside is not read from the file, as far as it can be.
-
-        Args:
-            since: the smallest time [s, host clock].
-            until: the largest.
-            kinds: of block, see ``BlockKind``.
-            progress: called now and then with the fraction of a run in a file that is done.
-        """
+        """Yield blocks of kinds, from and until a time [s, host clock]; the rest is not read, as far as it can be."""
         if not isinstance(self.blocks, Recording):
             for block in self.blocks:
                 if since <= block.time <= until and block.kind in kinds:
@@ -297,9 +290,6 @@ class Run:
     def place_sensors(self, scene: Scene | None = None) -> list[SensorOnArm]:
         """Return the places of the sensors on the arm, with the surfaces of links that the recording carries.
 
-        Args:
-            scene: that of the run with other settings.
-
         Raises:
             SceneError: this version of coneskin cannot read the scene, or a sensor lies on a mesh that is not carried.
             RecordingError: a surface is damaged.
@@ -334,10 +324,6 @@ class Run:
 
     def decide(self, core: GuardCore, progress: Progress = silent) -> Iterator[tuple[Block, list[Output]]]:
         """Feed the inputs of the run to a guard's core, one at a time, up to the first gap.
-
-        Args:
-            core: of a new guard.
-            progress: called now and then with the fraction of a run in a file that is done.
 
         Yields:
             each input and what the guard puts out for it; the list is used again.
@@ -381,7 +367,6 @@ class Run:
 
         Args:
             scene: another scene than the run's own, to see what it would have done.
-            progress: called now and then with the fraction of a run in a file that is done.
 
         Raises:
             SceneError: the scene cannot be read or built.
@@ -403,21 +388,12 @@ class Run:
         return Replay(events, recorded, len(then), differences, frames, until - since, self.missing, self.other_code())
 
     def timeline(self, events: Sequence[GuardEvent] | None = None) -> list[str]:
-        """Return a line of text for each event, with its time since the start of the run.
-
-        Args:
-            events: those of a replay; by default the recorded ones.
-        """
-
+        """Return a line of text for each event, by default the recorded ones, with its time since the run's start."""
         return [describe(event, self.start) for event in (self.events if events is None else events)]
 
 
 def read_header(block: Block | None, path: Path) -> dict[str, Any]:
-    """Return the header that a block holds.
-
-    Args:
-        block: the first of a recording; None where there is none.
-        path: of the recording.
+    """Return the header that the first block of a recording holds.
 
     Raises:
         RecordingError: there is none, or this version of coneskin cannot read it.
@@ -441,7 +417,6 @@ def read_run(path: Path | str, progress: Progress = silent) -> Run:
 
     Args:
         path: the recording, or the folder of a run with one in it.
-        progress: called now and then with the fraction of the files that is scanned.
 
     Raises:
         RecordingError: there is none, or it has no header.

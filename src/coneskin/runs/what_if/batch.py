@@ -70,12 +70,9 @@ def judge_runs(
     """Judge runs, each with each variant of its settings.
 
     Args:
-        paths: of the recordings.
         variants: settings; ``{}`` for those of the run.
         jobs: processes; by default one for each core. 1: this process.
         scheduler: address of a Dask scheduler, such as "tcp://10.0.0.5:8786", whose workers see the same paths.
-        progress: called with the fraction that is done.
-        judge: what is done with a run.
 
     Returns:
         a row for each run and variant, in the order of the runs; see ``judge_run``.

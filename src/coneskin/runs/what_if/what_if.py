@@ -188,10 +188,7 @@ def what_if(
     """Compare what today's guard makes of a run with what it makes of it with other settings.
 
     Args:
-        run: the recorded run.
         settings: such as ``{"reaction.kind": "stop", "detection.touch_level": 0.08}``.
-        tolerances: what does not count.
-        progress: called now and then with the fraction that is done.
 
     Raises:
         SceneError: with these settings the scene is none.

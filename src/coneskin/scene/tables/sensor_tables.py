@@ -223,7 +223,6 @@ def inline_sensor_files(
     """Copy the keys of sensor files and calibrations into the sensors' tables.
 
     Args:
-        tables: of the whole scene file; they are changed.
         folder: folder to which paths are relative; None where no file may be opened.
         calibrated: False to leave calibrations out.
         changed: True where the tables are others than the text's already.
@@ -249,13 +248,7 @@ def inline_sensor_files(
 
 
 def named_files(tables: dict[str, Any], folder: Path, key: str) -> list[Path | None]:
-    """Return what the sensors of a scene name under a key, "file" or "calibration", in the order of the file.
-
-    Args:
-        tables: of a scene file without mistakes.
-        folder: folder to which paths are relative.
-        key: of a sensor's table, or of the file that it names.
-    """
+    """Return what the sensors, or their files, name under "file" or "calibration", relative to a folder, in order."""
     merged = [{**merge_sensor_file(item, "", folder, []), **item} for item in sensor_tables(tables)]
     return [folder / str(table[key]) if key in table else None for table in merged]
 
@@ -292,10 +285,9 @@ def _named_tables(what: str, key: str, tables: Any) -> list[tuple[str, dict[str,
 
 
 def read_links(tables: Mapping[str, Any], folder: Path | None, problems: list[str]) -> tuple[LinkScene, ...]:
-    """Read the links and their sensors.
+    """Read the links and their sensors, from the tables that ``inline_sensor_files`` has completed.
 
     Args:
-        tables: of the whole file, after ``inline_sensor_files``.
         folder: folder to which the paths of meshes are relative; None if the files need not exist.
     """
     check({"link": tables.get("link", [])}, (Key("link", dict, ()),), "scene", problems)

@@ -63,9 +63,7 @@ def inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: li
     """Put the table of the file that a scene names in place of the name; return whether there was one.
 
     Args:
-        tables: of the whole scene; they are changed.
         folder: folder to which the name is relative; None where no file may be opened.
-        problems: to which every mistake is added.
     """
     arm = tables.get("arm")
     if not isinstance(arm, dict) or "speed_limit_from" not in arm:
@@ -123,7 +121,6 @@ def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None
     """Add what stands against the permissible speeds of a scene to the problems.
 
     Args:
-        scene: the whole of it.
         recorded: it comes from a recording, and was checked when the guard began.
     """
     from coneskin.robot.arm.kinematics import link_index

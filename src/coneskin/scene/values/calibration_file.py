@@ -228,7 +228,6 @@ def calibration_keys(place: Path, sensor: Sensor, simulated: bool) -> dict[str, 
     Args:
         place: what the scene names, a file or a folder.
         sensor: without a map.
-        simulated: it is a virtual one.
 
     Raises:
         ValueError: no calibration applies, or its map is none; the message says why.
