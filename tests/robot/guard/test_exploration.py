@@ -38,6 +38,15 @@ def test_a_touch_of_either_sensor_is_answered_and_latched_and_forgiven(reaction:
 
 
 @pytest.mark.long
+def test_from_a_slider_that_a_stop_has_put_to_0_a_person_gets_back_to_active() -> None:
+    blind = {"states mute", "mend the states", "touch one", "mend one", "the program ends"}
+    only = frozenset({"wait", "wait for a change", "a program moves", "unlock", "reset"} | blind)
+    found = explore(GuardWorld(Settings("slow", "external"), only=only), PROGRESS)
+    assert found.broken == {}
+    assert found.closed
+
+
+@pytest.mark.long
 def test_no_silence_of_a_process_is_left_alone() -> None:
     found = explore(ProcessWorld("internal"), PROGRESS)
     assert found.broken == {}

@@ -109,7 +109,7 @@ INVARIANTS = {
     "fault": "Under each fault an active guard stops within its limit, and becomes active under none.",
     "escalates": "Where the arm does not stand, every stop path that is left is used within 0.5 s.",
     "answered": "Each reset is accepted or refused at once, and an accepted one is over within 6 s.",
-    "slider": "A slider that a stop has put to 0 is raised only by an activation.",
+    "slider": "A slider that a stop has put to 0 is raised only after an accepted reset of the newest stop.",
     "raises": "Nothing that is fed raises.",
     PROGRESS: "From every state a person who mends what is wrong, and resets, gets back to active.",
 }
@@ -271,7 +271,7 @@ class GuardWorld:
         facts += [(detector.ready, detector.touched) for detector in core._stream.detectors]
         facts += [tuple(core._companions._silent), bool(arm.state_age.trouble(self.now)), arm.backup_ready]
         stop, slow = arm._stop, arm.speed_reduction
-        facts += [slow.now is None, slow._halted_from is None]
+        facts += [slow.now is None, slow._halted_from is None, slow.halted and self.arm.runtime_state == 2]
         if core.phase not in _RESTING:
             facts += [stop.watch.insists, len(arm._touches.contacts), arm._reaction.kind]
             if moves:
@@ -286,7 +286,14 @@ class GuardWorld:
         return self.core.phase is Phase.ACTIVE and not self.wrong.count()
 
     def helps(self, action: str) -> bool:
-        return action.startswith("mend") or action in ("wait", "wait for a change", "unlock", "reset", "restart")
+        return action.startswith("mend") or action in (
+            "wait",
+            "wait for a change",
+            "unlock",
+            "reset",
+            "restart",
+            "the program ends",
+        )
 
     def actions(self) -> Sequence[str]:
         only = self._only
@@ -300,6 +307,8 @@ class GuardWorld:
         more = wrong.count() < self.settings.most_wrong
         if phase is Phase.ACTIVE or self.settings.control == "external":
             found.append("a program moves")
+        if self.settings.control == "external" and self.arm.runtime_state == 2:
+            found.append("the program ends")
         if phase is not Phase.STARTING:
             found += ["reset", "reset another stop"]
         for sensor, name in zip(("skin", "other"), ("one", "two")[: self.settings.sensors], strict=False):
@@ -379,6 +388,9 @@ class GuardWorld:
             case ["a", "program", "moves"]:
                 arm.runtime_state = 2
                 arm.go([math.copysign(_SPEED, _START_Q[0] - arm.q[0]), 0, 0, 0, 0, 0], 20.0)
+            case ["the", "program", "ends"]:
+                arm.runtime_state = 1
+                arm.go([0.0] * 6, 20.0)
             case ["reset"]:
                 self._reset(self._judge.latched_stop)
             case ["reset", *_]:
@@ -574,7 +586,7 @@ class GuardWorld:
         elif isinstance(output, StopProgram):
             judge.used.add(StopPath.DRIVER.value)
         elif isinstance(output, SetSpeedSlider):
-            if judge.slider_at_0 and output.fraction > 0.0 and phase is not Phase.ACTIVE:
+            if judge.slider_at_0 and output.fraction > 0.0 and judge.forgiven != judge.stop:
                 self._break("slider", f"{output}")
             judge.slider_at_0 = judge.slider_at_0 and output.fraction <= 0.0
         elif isinstance(output, GuardEvent):
