@@ -89,10 +89,10 @@ HOT = {
     "skin/detection/place": "touch_place touch_filter place_estimate single_contact seam_contact",
     "robot/arm": "kinematics damped_least_squares vectors workspace",
     "robot/reaction": "retreat types",
-    "robot/guard": "core phase arm_stop arm_supervisor activation companion_monitor controller_heartbeat loop "
+    "robot/guard": "core phase arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",
     "robot/guard/motion": "motion_away setpoint_stream",
-    "robot/stop": "state_age stop_monitor",
+    "robot/stop": "arm_stop state_age stop_monitor",
     "robot/ur": "driver_process state_reader ur_rtde",
 }
 

@@ -13,7 +13,8 @@ from typing import Any, NamedTuple, Protocol, Self
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.model import ArmModel
 
-from .values import ArmReading, ControllerState, JointVelocitySetpoint, SetpointProgram, StopPath
+from .messages import EndReaction, StopProgram
+from .values import ArmReading, ControllerState, JointVelocitySetpoint, SetpointProgram, StopPath, UseStopPath
 
 
 class ExaminationScope(NamedTuple):
@@ -92,6 +93,13 @@ class OutputWriter(_Connection, Protocol):
 
     def set_register(self, number: int, value: int | float, /) -> None:
         """Write a register that programs on the controller read."""
+
+
+class StopSink(Protocol):
+    """What takes the commands of a stop."""
+
+    def append(self, command: StopProgram | EndReaction | UseStopPath, /) -> None:
+        """Take one command."""
 
 
 class StopConnections(_Connection, Protocol):

@@ -18,11 +18,11 @@ from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import Done, Reaction
+from coneskin.robot.stop.arm_stop import ArmStop
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.state_age import StateAge
 
 from .activation import ControllerNeeds
-from .arm_stop import ArmStop
 from .motion.motion_away import MotionAway
 from .phase import Act, Cue, Phase, Supervision, transition
 from .signals.contact import Contact, TouchRecord
@@ -246,7 +246,7 @@ class ArmSupervisor:
         elif self.state_age.stepped:
             self._bar("the controller's clock has stepped")
         if phase.brakes:
-            if self.state_age.fresh and stop.stands(state, measured_at, out):
+            if self.state_age.fresh and self._stands(state, measured_at, out):
                 self.speed_reduction.put_back(state.time, out)
                 self._decide(state, state.time + _PLACE_TIME, out)
         elif phase is Phase.RETREATING:
@@ -263,7 +263,7 @@ class ArmSupervisor:
         elif phase is Phase.PLACING:
             self._decide(state, self.supervision.decide_by, out)
         elif phase is Phase.STANDING:
-            stop.insist(state, self._reaction.deceleration, out)
+            stop.insist(state, out)
             self._latch(state, out)
 
     def poll(self, now: float, fair: float, out: Outputs) -> None:
@@ -276,7 +276,12 @@ class ArmSupervisor:
         """
         stop, phase = self._stop, self.supervision.phase
         if phase.brakes:
-            stop.escalate(now, self._reaction.deceleration, self.state, out)
+            path, rounds = stop.escalate(now, out)
+            if path is not None:
+                emit(out, EventName.ESCALATED, now, path=path.value)
+            if rounds:
+                speed = None if self.state is None else self.state.speed
+                emit(out, EventName.STOP_FAILED, now, rounds=rounds, speed=speed)
             self.speed_reduction.note_stop(stop.used)
         elif phase is Phase.SLOWED:
             if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
@@ -321,6 +326,16 @@ class ArmSupervisor:
         speed = None if state is None or self.state_age.silent(now) else state.speed
         self._stop.begin(now, speed, command.deceleration)
         return motion
+
+    def _stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
+        """Take a fresh state of a stop under way, report what it shows, and tell whether the arm stands."""
+        slows, stands = self._stop.update(state, measured_at)
+        if slows:
+            emit(out, EventName.DECELERATING, state.time, speed=state.speed)
+        if stands:
+            paths = [path.value for path in self._stop.used]
+            emit(out, EventName.STANDSTILL, state.time, speed=state.speed, paths=paths)
+        return stands
 
     def _bar(self, why: str) -> None:
         """Let nothing of ours move the arm before the next stop. Who ends a motion under way names the fault."""

@@ -1,8 +1,8 @@
-"""Stop of an arm that has lost its guard, by one stop path after the other, and its hold at standstill.
+"""Stop of an arm that has lost its guard, and its hold at standstill, by connections of its own.
 
-The first stop goes out through whatever connection is open, before anything that may block; what is missing is opened
-meanwhile, the reader of states too. Without any state the arm cannot be seen to stand: then a stop ends after a while,
-and ``StandstillHold`` repeats it.
+What is decided is the guard's own ``ArmStop``. The first stop goes out through whatever connection is open, before
+anything that may block. What is missing is opened meanwhile, the reader of states too. Without any state the arm cannot
+be seen to stand: then a stop ends after a while, and is repeated.
 """
 
 from __future__ import annotations
@@ -12,37 +12,40 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from coneskin.core.channel import wait_readable
 from coneskin.core.errors import ConeSkinError
+from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader, StopConnections
-from coneskin.robot.driver.values import ControllerState, StopPath
+from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
 
+from .arm_stop import ArmStop
 from .limits import MonitoringLimits
-from .standstill import WATCH_DURATION, StandstillWatch
 from .state_age import StateAge
-from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
+from .stop_monitor import PROTECTIVE_PATIENCE
 
 _STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE)
-_STRONGEST_FIRST = (StopPath.PROTECTIVE, StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER)
-_REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing
+_REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing while a stop is under way
+_REPEAT_PERIOD = 1.0  # s between two stops while no state comes
 _BLIND_TIMEOUT = 2.0  # s without a state after which a stop is given up, and the reader opened anew
 _CONNECT_TIMEOUT = 0.5  # s that opening the reader may take
 
 
-def _never() -> bool:
-    return False
-
-
-class BackupStop:
-    """Stop of one arm from outside its guard.
+class StandstillHold:
+    """Hold of one arm at standstill. A person who pushes or jogs the arm is left alone: no program runs then.
 
     Args:
         driver: of the arm.
         connections: open, or to be opened as far as that is possible.
         limits: of the monitoring.
-        deceleration: of the stop [rad/s2].
+        deceleration: of its stops, where the guard asks for no other [rad/s2].
         reader: of the controller's state, open; None where there is none yet.
         clock: monotonic seconds.
+
+    Attributes:
+        reader: connection that tells of new states; None while there is none.
+        stopping: True from a stop until the arm was measured standing, or no state has come for too long.
+        stands: True where the arm was seen standing for a whole watch after the newest stop, and ever since.
+        failed: True where the newest stop was given up before the arm was seen standing, or where its state has been
+            missing for so long since then that it would be given up.
     """
 
     def __init__(
@@ -54,115 +57,138 @@ class BackupStop:
         reader: PayloadReader | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self.reader = reader
+        self.stopping = self.stands = self.failed = False
         self._driver = driver
         self._connections = connections
         self._limits = limits
         self._deceleration = deceleration
-        self._reader = reader
         self._clock = clock
+        self._stop = ArmStop(limits, _STOP_PATHS)
         self._state: ControllerState | None = None  # the newest
         self._age = StateAge(limits.arm_silence)
         self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried
         self._quiet_until = -math.inf
-        self._used: list[StopPath] = []  # by the newest stop
+        self._began: float | None = None  # the newest stop; None before the first
+        self._due = 0.0  # when what is missing is opened next, or a stop repeated
 
-    @property
-    def reader(self) -> PayloadReader | None:
-        """Connection that tells of new states; None while there is none."""
-        return self._reader
-
-    def states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
-        """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
-        return self._age.silent(self._clock(), max(2.0 * self._limits.arm_silence, at_least))
-
-    def stop(
-        self, deceleration: float | None = None, over: Callable[[], bool] = _never, strongest: bool = False
-    ) -> bool:
-        """Stop the arm and return whether it was seen standing.
+    def begin(self, deceleration: float | None = None) -> None:
+        """Stop the arm now, from now on with this deceleration [rad/s2]. ``poll`` then watches whether it stands.
 
         While states show that the arm moves, the stop is not given up.
-
-        Args:
-            deceleration: of the stop [rad/s2]; by default that of the constructor.
-            over: asked continuously; True ends the stop as it is.
-            strongest: begin with the protective stop.
         """
-        gentle = self._deceleration if deceleration is None else deceleration
-        limits = self._limits
-        self.read()
-        paths = _STRONGEST_FIRST if strongest else _STOP_PATHS
-        if not self._use(paths[0], gentle):
-            self._use(StopPath.COMMAND, gentle)
-        now = start = self._clock()
-        speed = None if self._state is None or self.states_missing() else self._state.speed
-        budget = limits.stop_budget(speed or 0.0, gentle)
-        stop = StopMonitor(now, speed, paths, limits.escalate, budget, limits.standstill, limits.arm_silence)
-        look_at = now
-        while stop.standing_at is None and now - max(start, self._age.fresh_at) < _BLIND_TIMEOUT and not over():
-            if now >= look_at:
-                self.reconnect(gentle)
-                look_at = self._clock() + _REOPEN_PERIOD
-            wait_readable([] if self._reader is None else [self._reader], 0.002)
-            self.read(stop)
-            now = self._clock()
-            for path in stop.next_paths(now):
-                self._use(path, gentle)
-        self._used = stop.used
-        return stop.standing_at is not None
+        self.rest()
+        if deceleration is not None:
+            self._deceleration = deceleration
+        self._stop.send(StopProgram(self._deceleration), self)
+        self._began = self._due = now = self._clock()
+        speed = None if self._state is None or self._states_missing() else self._state.speed
+        self._stop.begin(now, speed, self._deceleration)
+        self.stopping, self.stands = True, False
 
-    def insist(self) -> None:
-        """Repeat the protective stop, where the newest stop took one that the controller does not show."""
-        if StopPath.PROTECTIVE in self._used and self._state is not None and not self._state.stopped_by_safety:
-            self._use(StopPath.PROTECTIVE, self._deceleration)
+    def rest(self) -> None:
+        """Take what has come and do nothing more: the arm is guarded."""
+        self._read()
 
-    def repeat(self) -> None:
-        """Send a gentle stop once more, through both connections, without looking at its effect."""
-        self.reconnect(self._deceleration)
-        for path in (StopPath.PROGRAM, StopPath.COMMAND):
-            self._use(path, self._deceleration)
+    def append(self, command: StopProgram | EndReaction | UseStopPath, /) -> None:
+        """Send a stop by one path, or by ``COMMAND`` where its connection is not there."""
+        assert isinstance(command, UseStopPath)
+        if not self._use(command.path):
+            self._use(StopPath.COMMAND)
 
-    def reconnect(self, deceleration: float) -> None:
-        """Open what is missing; where a stop path comes back, a stop with this deceleration goes through it."""
-        if self._connections.reopen() and not self._use(StopPath.PROGRAM, deceleration):
-            self._use(StopPath.COMMAND, deceleration)  # what was sent over the old ones may be lost
-        now = self._clock()
-        if now - max(self._age.fresh_at, self._opened) < (
-            _BLIND_TIMEOUT if self._reader is not None else _CONNECT_TIMEOUT
-        ):
-            return
-        self._close_reader()
-        with suppress(ConeSkinError):  # the next look tries again
-            self._reader = self._driver.state_reader(self._connections.host, _CONNECT_TIMEOUT).__enter__()
-        self._opened = self._clock()
+    def poll(self) -> bool:
+        """Look at the arm, and stop it where it moves. To be called continuously.
 
-    def read(self, stop: StopMonitor | None = None) -> list[ControllerState]:
-        """Return the states that have come, oldest first, without waiting."""
-        states = []
-        try:
-            for payload in [] if self._reader is None else self._reader.read():
-                state = self._driver.decode_state(self._clock(), payload)
-                states.append(state)
-                measured_at = self._age.feed(state)
-                if self._age.fresh and stop is not None:
-                    stop.sample(state.time, state.speed, measured_at)
-                self._state = state
-        except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
-            self._close_reader()
-        for _, sock, _ in self._connections.drain():
-            sock.close()
-        return states
+        Returns:
+            whether there is an outcome to report: ``stands`` has become true, or a stop has failed.
+        """
+        states, now = self._read(), self._clock()
+        if self.stopping:
+            return self._continue(states, now)
+        watch = self._stop.watch
+        moved = sum(watch.moved(state, True) for state, _ in states) > 0  # every state has to be taken
+        if self._began is not None and self._states_missing():
+            self.stands = False
+            if now >= self._due:
+                self._reconnect()
+                for path in (StopPath.PROGRAM, StopPath.COMMAND):
+                    self._use(path)
+                self._due = self._clock() + _REPEAT_PERIOD
+                self.failed = self.failed or self._states_missing(_BLIND_TIMEOUT)
+            return False
+        if moved or not watch.under_way:
+            self.begin()
+            return False
+        self.failed = False
+        if self.stands:
+            return False
+        self.stands = watch.confirmed
+        if not self.stands and self._state is not None:
+            self._stop.insist(self._state, self)
+        return self.stands
 
     def close(self) -> None:
         """Close all connections; may be called again."""
         self._close_reader()
         self._connections.close()
 
-    def _close_reader(self) -> None:
-        if self._reader is not None:
-            self._reader.close()
-            self._reader = None
+    def _continue(self, states: list[tuple[ControllerState, float]], now: float) -> bool:
+        """Go on with the stop under way. Return whether it has failed."""
+        assert self._began is not None
+        for state, measured_at in states:
+            if self._stop.update(state, measured_at)[1]:
+                self._stop.stay(state)
+                self.stopping = self.failed = False
+        if not self.stopping:
+            return False
+        if now - max(self._began, self._age.fresh_at) >= _BLIND_TIMEOUT:
+            self.stopping, self.failed = False, True
+            self._due = now + _REPEAT_PERIOD
+            return True
+        if now >= self._due:
+            self._reconnect()
+            self._due = self._clock() + _REOPEN_PERIOD
+        self._stop.escalate(self._clock(), self)
+        return False
 
-    def _use(self, path: StopPath, deceleration: float) -> bool:
+    def _states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
+        """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
+        return self._age.silent(self._clock(), max(2.0 * self._limits.arm_silence, at_least))
+
+    def _reconnect(self) -> None:
+        """Open what is missing; where a stop path comes back, a stop goes through it."""
+        if self._connections.reopen():  # what was sent over the old ones may be lost
+            self.append(UseStopPath(StopPath.PROGRAM, self._deceleration))
+        now = self._clock()
+        timeout = _CONNECT_TIMEOUT if self.reader is None else _BLIND_TIMEOUT
+        if now - max(self._age.fresh_at, self._opened) < timeout:
+            return
+        self._close_reader()
+        with suppress(ConeSkinError):  # the next look tries again
+            self.reader = self._driver.state_reader(self._connections.host, _CONNECT_TIMEOUT).__enter__()
+        self._opened = self._clock()
+
+    def _read(self) -> list[tuple[ControllerState, float]]:
+        """Return the fresh states that have come, oldest first, and when each was measured [s], without waiting."""
+        states = []
+        try:
+            for payload in [] if self.reader is None else self.reader.read():
+                self._state = self._driver.decode_state(self._clock(), payload)
+                measured_at = self._age.feed(self._state)
+                if self._age.fresh:
+                    states.append((self._state, measured_at))
+        except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
+            self._close_reader()
+        for _, sock, _ in self._connections.drain():
+            sock.close()
+        return states
+
+    def _close_reader(self) -> None:
+        if self.reader is not None:
+            self.reader.close()
+            self.reader = None
+
+    def _use(self, path: StopPath) -> bool:
         """Send a stop, unless it would replace the program of a protective stop that has only just been sent.
 
         Returns:
@@ -171,77 +197,7 @@ class BackupStop:
         now = self._clock()
         if now < self._quiet_until:
             return True
-        taken = self._connections.use(path, deceleration)
+        taken = self._connections.use(path, self._deceleration)
         if taken and path is StopPath.PROTECTIVE:
             self._quiet_until = now + PROTECTIVE_PATIENCE * self._limits.escalate
         return taken
-
-
-_REPEAT_PERIOD = 1.0  # s between two stops while no state comes
-
-
-class StandstillHold:
-    """Hold of one arm at standstill. A person who pushes or jogs the arm is left alone: no program runs then.
-
-    Args:
-        backup_stop: of the arm.
-        standstill: joint speed below which the arm stands [rad/s].
-        clock: monotonic seconds.
-
-    Attributes:
-        stands: True where the arm was seen standing for a whole watch after the newest stop, and ever since.
-        failed: True where the newest stop was given up before the arm was seen standing, or where its state has been
-            missing for so long since then that it would be given up.
-    """
-
-    def __init__(self, backup_stop: BackupStop, standstill: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._stop = backup_stop
-        self._clock = clock
-        self._watch = StandstillWatch(standstill)
-        self._due: float | None = None  # None until the first stop
-        self.stands = self.failed = False
-
-    @property
-    def reader(self) -> PayloadReader | None:
-        """Connection that tells of new states; None while there is none."""
-        return self._stop.reader
-
-    def rest(self) -> None:
-        """Take what has come and do nothing more: the arm is guarded."""
-        self._stop.read()
-
-    def begin(self, deceleration: float | None = None, over: Callable[[], bool] = lambda: False) -> None:
-        """Stop the arm now; ``poll`` then watches whether it stands. Arguments as of ``BackupStop.stop``."""
-        self._watch.end()
-        self.stands = False
-        self.failed = not self._stop.stop(deceleration, over, self._watch.insists)
-        self._due = self._clock() + _REPEAT_PERIOD
-        if not self.failed:
-            self._watch.begin(self._clock(), WATCH_DURATION)
-
-    def poll(self, over: Callable[[], bool] = lambda: False) -> bool:
-        """Look at the arm, and stop it where it moves. To be called continuously.
-
-        Returns:
-            whether there is an outcome to report: ``stands`` has become true, or a stop has failed.
-        """
-        states = self._stop.read()
-        moved = sum(self._watch.moved(state, True) for state in states) > 0  # every state has to be taken
-        if self._due is not None and self._stop.states_missing():
-            self.stands = False
-            if self._clock() < self._due:
-                return False
-            self._stop.repeat()
-            self._due = self._clock() + _REPEAT_PERIOD
-            self.failed = self.failed or self._stop.states_missing(_BLIND_TIMEOUT)
-            return False
-        if moved or not self._watch.under_way:
-            self.begin(over=over)
-            return self.failed
-        self.failed = False
-        if self.stands:
-            return False
-        self.stands = self._watch.confirmed
-        if not self.stands:
-            self._stop.insist()
-        return self.stands

@@ -31,10 +31,11 @@ from coneskin.robot.driver.messages import (
 from coneskin.robot.driver.protocol import PayloadReader
 from coneskin.robot.driver.registry import load_driver
 
-from .backup_stop import BackupStop, StandstillHold
+from .backup_stop import StandstillHold
 from .limits import MonitoringLimits
 
 _POLL_PERIOD = 0.01  # s between two looks
+_STOP_POLL_PERIOD = 0.002  # s; while a stop is under way
 _CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
 
 
@@ -62,6 +63,8 @@ class _GuardWatchdog:
         self._hold = hold
         self._patience = patience
         self._left = False  # the guarded program
+        self._ended = False  # the guard, in order
+        self._asked: StopProgram | None = None  # a stop that waits for the one under way
         self._clock = clock
         self._heard: float | None = None  # None until the guard's first heartbeat
         self._alone = False  # the guard is gone, or hangs
@@ -69,7 +72,7 @@ class _GuardWatchdog:
 
     def run(self) -> None:
         """Serve until the guard has left and the arm stands."""
-        while self.poll(_POLL_PERIOD):
+        while self.poll(_STOP_POLL_PERIOD if self._hold.stopping else _POLL_PERIOD):
             pass
 
     def poll(self, timeout: float) -> bool:
@@ -78,48 +81,42 @@ class _GuardWatchdog:
         if (reader := self._hold.reader) is not None:
             inputs.append(reader)
         wait_readable(inputs, timeout)
-        now = self._clock()
-        self._beat()
+        now, hold = self._clock(), self._hold
+        self._beat(now)
         self._left = self._left or LEAVE in self._session.receive() or self._session.closed
-        asked: StopProgram | None = None
         for message in self._guard.receive():
             self._heard, self._alone = now, False
             match decode_command(message):
                 case Shutdown():
-                    return False
+                    self._ended = True
                 case Release(number):
                     self._guard.send(StatusReport("released", str(number)).encode())
                 case StopProgram() as stop:
-                    asked = stop  # of several that have waited the newest
-        if asked is not None:
-            self._hold.begin(asked.deceleration, self._beat)
-            return True
+                    self._asked = stop  # of several that have waited the newest
         gone = self._guard.closed
-        if gone and self._heard is None:
-            return False  # it never guarded anything
-        if not gone and (self._heard is None or now - self._heard <= self._patience):
-            self._hold.rest()
-        elif not self._alone:
+        if hold.stopping or (self._alone and self._asked is None):
+            outcome = hold.poll()
+            if outcome and self._alone:  # tell the program whether the arm stands, where that is known now
+                self._session.send(encode_json({"stands": hold.stands}))
+        elif self._asked is not None:
+            hold.begin(self._asked.deceleration)
+            self._asked = None
+        elif self._ended or (gone and self._heard is None):
+            return False  # it has left, or never guarded anything
+        elif not gone and (self._heard is None or now - self._heard <= self._patience):
+            hold.rest()
+        else:
             self._alone = True
             what = f"the guard was silent for {self._patience:g} s, the arm was stopped"
             self._guard.send(StatusReport("error", what).encode())
-            self._hold.begin(over=self._beat)
-            self._report(self._hold.failed)
-        else:
-            self._report(self._hold.poll(self._beat))
-        return not (gone and self._left and (self._hold.stands or self._hold.failed))
+            hold.begin()
+        return hold.stopping or not (gone and self._left and (hold.stands or hold.failed))
 
-    def _report(self, outcome: bool) -> None:
-        """Tell the program whether the arm stands, where that is known now."""
-        if outcome:
-            self._session.send(encode_json({"stands": self._hold.stands}))
-
-    def _beat(self) -> bool:
-        """Send a heartbeat where one is due; return False, because no stop under way is over with it."""
-        if (now := self._clock()) - self._beaten >= BEAT_PERIOD:
+    def _beat(self, now: float) -> None:
+        """Send a heartbeat where one is due at a time [s]."""
+        if now - self._beaten >= BEAT_PERIOD:
             self._beaten = now
             self._guard.send(StatusReport("alive").encode())
-        return False
 
 
 def main(arguments: list[str]) -> int:
@@ -140,12 +137,12 @@ def main(arguments: list[str]) -> int:
             if not second:
                 connections = stack.enter_context(driver.stop_connections(host))
                 reader = stack.enter_context(driver.state_reader(host))
-            stop = BackupStop(driver, connections, limits, settings["deceleration"], reader)
-            stack.callback(stop.close)
+            hold = StandstillHold(driver, connections, limits, settings["deceleration"], reader)
+            stack.callback(hold.close)
             lifeline.hold()
             guard.send(StatusReport("ready").encode())
             patience = UNGUARDED_TIME if second else GUARD_SILENCE
-            _GuardWatchdog(guard, session, StandstillHold(stop, limits.standstill), patience).run()
+            _GuardWatchdog(guard, session, hold, patience).run()
     except ConeSkinError as exc:
         guard.send(StatusReport("error", str(exc)).encode())
         return 1

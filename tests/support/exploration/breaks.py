@@ -16,7 +16,6 @@ from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import SetSpeedSlider
 from coneskin.robot.guard import arm_supervisor
 from coneskin.robot.guard.activation import Activation, ActivationStep
-from coneskin.robot.guard.arm_stop import ArmStop
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
@@ -207,7 +206,7 @@ BREAKS: dict[str, Break] = {
         *("a reset is never over", (*_TOUCH, "reset")),
     ),
     "slider": Break(
-        *(ArmStop, "stands"),
+        *(ArmSupervisor, "_stands"),
         lambda was: lambda self, *args: args[-1].append(SetSpeedSlider(1.0)) or was(self, *args),
         *("a standing arm's slider is raised", ("all paths fail", "mend the arm", *_TOUCH)),
         _TWO,

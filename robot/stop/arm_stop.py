@@ -1,20 +1,23 @@
-"""Stop of one arm under guard: its cause, one stop path after the other, standstill, and latching. Pure."""
+"""Stop of one arm: one stop path after the other, standstill, and the watch after it. Pure.
+
+The guard stops its arm by this, and so does a guard watchdog, beside its own connections.
+"""
 
 from __future__ import annotations
 
 import math
 
 from coneskin.robot.driver.messages import EndReaction, StopProgram
+from coneskin.robot.driver.protocol import StopSink
 from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
-from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.robot.stop.standstill import WATCH_DURATION, StandstillWatch
-from coneskin.robot.stop.stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
-from .signals.journal import EventName, Outputs, emit
+from .limits import MonitoringLimits
+from .standstill import WATCH_DURATION, StandstillWatch
+from .stop_monitor import PROTECTIVE_PATIENCE, StopMonitor
 
 
 class ArmStop:
-    """Newest stop of one arm, from its cause to the latched arm.
+    """Newest stop of one arm, from its cause to the standing arm.
 
     The first path is used for every stop, the others where it does not work.
 
@@ -38,10 +41,11 @@ class ArmStop:
         self._first = paths[0]
         self._others_move = StopPath.DRIVER not in paths
         self._order = paths  # of the stop under way
+        self._deceleration = 0.0  # of it [rad/s2]
         self._monitor: StopMonitor | None = None
         self._protective_at = 0.0  # when it was last used
 
-    def send(self, command: StopProgram | EndReaction, out: Outputs) -> None:
+    def send(self, command: StopProgram | EndReaction, out: StopSink) -> None:
         """Send a stop by its first path. Another path than the driver process has the command's deceleration."""
         paths = self.paths
         if self.watch.insists and StopPath.PROTECTIVE in paths:
@@ -58,7 +62,7 @@ class ArmStop:
             speed: largest joint speed [rad/s]. None where it is not known.
             deceleration: of the stop [rad/s2].
         """
-        limits = self._limits
+        limits, self._deceleration = self._limits, deceleration
         if self._order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
         budget = limits.stop_budget(speed or 0.0, deceleration)
@@ -73,54 +77,52 @@ class ArmStop:
         if self._monitor is not None:
             self._monitor.forget(paths, now)
 
-    def escalate(self, now: float, deceleration: float, state: ControllerState | None, out: Outputs) -> None:
-        """Use the next path where one is due.
+    def escalate(self, now: float, out: StopSink) -> tuple[StopPath | None, int]:
+        """Use the next path where one is due at a host time [s].
 
-        Args:
-            now: host time [s].
-            deceleration: of the stop [rad/s2].
-            state: the newest, for the report. None before the first.
-            out: takes commands and events.
+        Returns:
+            the path, where this stop has used it for the first time. How often all of them have been used, where that
+            has become 1, 2, 4 and so on, else 0.
         """
-        stop = self._monitor
+        stop, first = self._monitor, None
         if stop is None:
-            return
+            return None, 0
         rounds, used = stop.rounds, len(stop.used)
         for path in stop.next_paths(now):
-            out.append(UseStopPath(path, deceleration))
+            out.append(UseStopPath(path, self._deceleration))
             self.used = tuple(stop.used)
             if path is StopPath.PROTECTIVE:
                 self._protective_at = now
             if len(stop.used) > used:
-                emit(out, EventName.ESCALATED, now, path=path.value)
-        if stop.rounds > rounds and (stop.rounds & rounds) == 0:  # the first, second, fourth ... time
-            speed = None if state is None else state.speed
-            emit(out, EventName.STOP_FAILED, now, rounds=stop.rounds, speed=speed)
+                first = path
+        return first, stop.rounds if stop.rounds > rounds and (stop.rounds & rounds) == 0 else 0
 
-    def stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
-        """Take a state, measured at a host time [s]. Return whether the arm stands, which begins the watch."""
+    def update(self, state: ControllerState, measured_at: float) -> tuple[bool, bool]:
+        """Take a fresh state, measured at a host time [s].
+
+        Returns:
+            whether it is the first that shows a slowdown, and whether the arm stands, which begins the watch.
+        """
         stop = self._monitor
         if stop is None:
-            return False
+            return False, False
         before = stop.slowed_at
         stop.sample(state.time, state.speed, measured_at)
-        if before is None and stop.slowed_at is not None and not stop.rippled:
-            emit(out, EventName.DECELERATING, state.time, speed=state.speed)
+        slows = before is None and stop.slowed_at is not None and not stop.rippled
         if stop.standing_at is None:
-            return False
-        emit(out, EventName.STANDSTILL, state.time, speed=state.speed, paths=[path.value for path in stop.used])
+            return slows, False
         self.first_was_enough = stop.used == [self._first]
         self._monitor = None
         self.watch.begin(state.time, math.inf)
-        return True
+        return slows, True
 
-    def insist(self, state: ControllerState, deceleration: float, out: Outputs) -> None:
+    def insist(self, state: ControllerState, out: StopSink) -> None:
         """Repeat a protective stop that the controller's safety system does not show, though the arm stands."""
         if not self.unconfirmed(state) or StopPath.PROTECTIVE not in self.paths:
             return
         if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
             self._protective_at = state.time
-            out.append(UseStopPath(StopPath.PROTECTIVE, deceleration))
+            out.append(UseStopPath(StopPath.PROTECTIVE, self._deceleration))
 
     def stay(self, state: ControllerState) -> None:
         """Let the arm stand: at once where no other program can start, else to the end of a watch."""
