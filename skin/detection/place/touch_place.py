@@ -77,7 +77,7 @@ class TouchPlace:
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
         self._softer = self._harder = 0.0
-        self._begun = False
+        self._begun = self._located = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
         self._first_x = self._first_y = 0.0
@@ -85,7 +85,7 @@ class TouchPlace:
 
     def end(self) -> None:
         """Forget the touch: it is over."""
-        self._begun, self._newest = False, None
+        self._begun, self._located, self._newest = False, False, None
         self._seam.end()
         self._restart()
 
@@ -108,9 +108,7 @@ class TouchPlace:
             return TouchReading(now, level, 0.0, 0.0, False, WEAK, frame.clock_us, frame.sequence)
         self._began = now
         self._filter.begin(matrix)
-        u, phi = self._estimator.place(matrix.x, matrix.y, 0.0, 0.0)
-        if self._map is not None:
-            u, phi = self._map.apply(u, phi)
+        u, phi = self._placed(matrix.x, matrix.y, None)
         doubt = self._doubt(reading, matrix, level, u, None) or MOVES
         return TouchReading(now, level, u, phi, False, doubt, frame.clock_us, frame.sequence)
 
@@ -143,11 +141,12 @@ class TouchPlace:
         self._rest -= 1
         if estimate is None or (self._rest <= 0 and (frames >= self._next or not steady)):
             estimate, steady = self._solve(frame, now, period), True
-        u, phi = self._estimator.place(x, y, estimate.move_x, estimate.move_y)
-        if self._map is not None:
-            u, phi = self._map.apply(u, phi)
-        covariance = estimate.covariance(track.share, track.motion)
+        u, phi = self._placed(x, y, estimate)
         doubt = self._doubt(reading, matrix, level, u, estimate)
+        if not (doubt or steady or self._located):  # the first certain place is told with its covariance
+            estimate, steady = self._solve(frame, now, period), True
+            u, phi = self._placed(x, y, estimate)
+        covariance = estimate.covariance(track.share, track.motion)
         step_x, step_y, _ = track.velocity
         rate = 1.0 / period if period > 0.0 else 0.0
         velocity = step_x * estimate.scale[0] * rate, step_y * estimate.scale[1] * rate
@@ -159,11 +158,16 @@ class TouchPlace:
             )
         if not doubt and covariance[2] > self._loosest * (self._radius1 + self._taper * u) ** 2:
             doubt = _UNKNOWN_NORMAL
+        self._located = self._located or not doubt
         return TouchReading(
             *(now, level, u, phi, not doubt, doubt, frame.clock_us, frame.sequence),
             *(covariance if steady else None, *(self._told if steady else _NO_DETAILS)),
             *(self._single.elongation(whole) if doubt else None, velocity),
         )
+
+    def _placed(self, x: float, y: float, estimate: PlaceEstimate | None) -> tuple[float, float]:
+        u, phi = self._estimator.place(x, y, *((0.0, 0.0) if estimate is None else (estimate.move_x, estimate.move_y)))
+        return (u, phi) if self._map is None else self._map.apply(u, phi)
 
     def _contacts(self, reading: Reading) -> ContactMatrix | None:
         """Return what the contacts are to the electrodes, the leak taken off."""
