@@ -218,31 +218,24 @@ def draw_error(
     figure.savefig(path, dpi=130)
 
 
-def draw_curves(
-    path: Path, x: Floats, panels: Sequence[Sequence[tuple[str, Floats, str]]], labels: tuple[str, str], title: str
-) -> None:
-    """Draw curves over one axis.
+def draw_curves(path: Path, radii: Floats, curves: Sequence[tuple[str, Floats, str]], what: str, title: str) -> None:
+    """Draw curves over the contact radius.
 
     Args:
         path: of the PNG.
-        x: abscissa.
-        panels: one above the other, each with a scale of its own; their curves as (label, ordinate, matplotlib format).
-        labels: of the axes.
+        radii: of the contact [mm].
+        curves: as (label, ordinate, matplotlib format).
+        what: is drawn, with its unit.
         title: of the picture.
 
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    figure, (axes,) = make_figure(5.6, 4.0 if len(panels) == 1 else 2.7 * len(panels))
-    axes.remove()
-    for number, curves in enumerate(panels):
-        axes = figure.add_subplot(len(panels), 1, number + 1)
-        for label, y, style in curves:
-            axes.plot(x, y, style, label=label, lw=1.4)
-        axes.set_ylabel(labels[1])
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
-        if number == 0:
-            axes.set_title(title, fontsize=10)
-    axes.set_xlabel(labels[0])
+    figure, (axes,) = make_figure(5.6, 4.0)
+    for label, y, style in curves:
+        axes.plot(radii, y, style, label=label, lw=1.4)
+    axes.set(xlabel="contact radius [mm]", ylabel=what, xlim=(0.0, radii[-1]))
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    axes.set_title(title, fontsize=10)
     figure.savefig(path, dpi=130)

@@ -103,7 +103,7 @@ def draw_potential(
         ticks = np.linspace(volts.min(), volts.max(), 6).round(9) + 0.0
         figure.colorbar(picture, ax=axes, label="potential [V]", shrink=0.85, ticks=ticks, format="%.3g")
     lines = axes.contour(x, y, volts, 11, colors="white" if filled else "tab:blue", linewidths=0.9)
-    axes.clabel(lines, fontsize=7, fmt="%.2g")
+    axes.clabel(lines, fontsize=7, fmt="%.3g")
     _field_lines(axes, field, upper)
     _outline(axes, sheet, names)
     axes.set_title(title, fontsize=10)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import cycle, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
-#: of lines that no eye takes for each other (Okabe and Ito 2008), and dashes, for paper without colour
+#: of lines that no eye takes for each other (Okabe and Ito 2008)
 _LINE_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9", "#E69F00")
-_LINE_DASHES = ("-", "--", "-.", ":")
+LINE_DASHES = ("-", "--", "-.", ":")  #: of curves in one plot, for paper without colour
 
 
 @contextmanager
@@ -25,11 +24,10 @@ def picture_style() -> Iterator[None]:
     import matplotlib
     from cycler import cycler
 
-    count = len(_LINE_COLORS)
-    lines = cycler(color=_LINE_COLORS) + cycler(linestyle=list(islice(cycle(_LINE_DASHES), count)))
-    look = {"axes.prop_cycle": lines, "axes.spines.top": False, "axes.spines.right": False, "grid.alpha": 0.3}
+    look = {"axes.spines.top": False, "axes.spines.right": False, "grid.alpha": 0.3, "axes.axisbelow": True}
+    lines = {"axes.prop_cycle": cycler(color=_LINE_COLORS), "axes.titlesize": 10}
     words = {"text.parse_math": False, "text.usetex": False, "legend.fontsize": 8, "legend.frameon": False}
-    with matplotlib.rc_context({**look, **words, "axes.titlesize": 10, "axes.axisbelow": True}):
+    with matplotlib.rc_context({**look, **lines, **words}):
         yield
 
 

@@ -85,8 +85,8 @@ def test_each_error_map_frames_the_areas_of_the_table(tmp_path, monkeypatch: pyt
         marked = [float(line.get_ydata()[0]) for line in scale.lines]
         assert marked == [-bound, bound]
         assert scale.get_ylim()[1] >= bound
-    middle, beside = figures["fig12c"].axes
-    assert np.ptp(middle.get_ylim()) < 0.01 < np.ptp(beside.get_ylim())  # deg: the zero and the paper's 0.0014 apart
+    (beside,) = figures["fig12c"].axes
+    assert all(np.ptp(line.get_ydata()) > 0.01 for line in beside.lines), "deg: no panel of what is zero by symmetry"
 
 
 def test_demo_names_a_mistake_without_a_traceback(

@@ -99,7 +99,7 @@ def _draw_curves(axes: Any, found: SpeedMap) -> None:
             named[number] = f"{what}, {word}" if len(ranked) > 1 else what
     for number, curve in enumerate(found.curves):
         if number not in named:
-            axes.plot(LEVERS, curve.speeds, color="0.75", ls="-", linewidth=0.7)
+            axes.plot(LEVERS, curve.speeds, color="0.75", linewidth=0.7)
     for number, name in named.items():
         curve = found.curves[number]
         mass = "any mass" if math.isinf(curve.mass) else f"up to {curve.mass:g} kg"
@@ -124,12 +124,8 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
         speed = curve.speeds[_LEVER_INDEX]
         contact = contact_at(speed, LEVERS[_LEVER_INDEX], curve.mass, region, limits.measured, padding, curve.extra)
         course = integrate(contact)
-        (line,) = axes.plot(
-            [1e3 * t for t in times],
-            [course.force(t) for t in times],
-            ls="-",
-            label=f"{region.name} at {speed:.2f} m/s",
-        )
+        forces = [course.force(t) for t in times]
+        (line,) = axes.plot([1e3 * t for t in times], forces, label=f"{region.name} at {speed:.2f} m/s")
         axes.axhline(region.limits.transient, color=line.get_color(), linestyle="--", linewidth=0.8)
         axes.axhline(region.limits.lasting, color=line.get_color(), linestyle=":", linewidth=0.8)
         if math.isfinite(course.braked):

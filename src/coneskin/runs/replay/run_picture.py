@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.picture_file import write_picture
+from coneskin.core.picture_file import LINE_DASHES, write_picture
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import GuardEvent, stopping_contact
@@ -141,7 +141,7 @@ def _draw_speeds(
         measured.append(state.qd)
     for joint in range(6):
         speeds = [qd[joint] for qd in measured]
-        axes.plot(times, speeds, lw=1.3, label=f"joint {joint + 1}")
+        axes.plot(times, speeds, LINE_DASHES[joint % len(LINE_DASHES)], lw=1.3, label=f"joint {joint + 1}")
     axes.axvline(0.0, color=_TOUCH_COLOR, lw=1.0)
     style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
     axes.text(0.0, 1.01, f"{word} ", color=_TOUCH_COLOR, ha="right", **style)
@@ -165,8 +165,9 @@ def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[fl
             times, levels = series[sensor.name]
             times.append(1e3 * (time - zero))
             levels.append(read(sensor, frame).level)
-    for item in scene.sensors:
-        axes.plot(*series[item.sensor.name], lw=1.2, label=item.sensor.name)
+    for number, item in enumerate(scene.sensors):
+        dash = LINE_DASHES[number % len(LINE_DASHES)]
+        axes.plot(*series[item.sensor.name], dash, lw=1.2, label=item.sensor.name)
         axes.axhline(item.sensor.thresholds.touch_level, color=_TOUCH_COLOR, lw=0.8, ls="--")
         axes.axhline(item.sensor.thresholds.release_level, color="0.5", lw=0.8, ls=":")
     axes.set_ylabel("touch level (dashed: on, dotted: off)")

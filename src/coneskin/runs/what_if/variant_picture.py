@@ -77,7 +77,7 @@ def _draw_places(axes: Any, scores: Sequence[VariantScore], time: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     places = {number: _place(score) for number, score in enumerate(scores, 1) if not math.isnan(score.delay)}
-    axes.plot(*zip(*places.values(), strict=True), color="0.7", ls="-", lw=1.0, zorder=1)
+    axes.plot(*zip(*places.values(), strict=True), color="0.7", lw=1.0, zorder=1)
     for number, at in places.items():
         colour, marker = _look(scores[number - 1])
         axes.scatter(*at, color=colour, marker=marker, zorder=2)
