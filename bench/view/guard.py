@@ -3,7 +3,9 @@
 The arm moves to and fro all the time. In each round there is no page, a page that nobody looks at, one with viewers
 that draw nothing, one with a browser, and a browser that draws a box while nobody looks at the page. "Giving way": in
 the scheduling class that runs only while nothing else wants to (SCHED_IDLE), which stands for another computer, or for
-a GPU; what it shares with the guard then is a core's caches.
+a GPU; what it shares with the guard then is a core's caches. Linux first divides its time among sessions (autogroup in
+sched(7)), so the page and its viewers are in sessions of their own, as in another terminal. How long the guard's
+process was ready and got no processor tells the page's cost on a machine that is busy with other things as well.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from coneskin.runs.replay.run import read_run
 from coneskin.skin.wire import FrameDecoder
 
 from .browser import browser_processes, drawn_pictures, first_picture
+from .viewer import waited
 
-Spans = dict[str, list[tuple[float, float]]]
+Spans = dict[str, list[tuple[float, float, float]]]
 
 _SETTLE_TIME = 2.0  # s after a change, before anything is measured
 
@@ -36,6 +39,7 @@ def guard_rounds(
     wait: Callable[[float], object],
     rounds: int,
     seconds: float,
+    pid: int,
 ) -> Spans:
     """Measure each case in each round.
 
@@ -46,17 +50,18 @@ def guard_rounds(
         wait: lets the session go on for a time [s].
         rounds: how often.
         seconds: of each case.
+        pid: of the guard's process.
 
     Returns:
-        when each case was measured [s, monotonic].
+        when each case was measured [s, monotonic], and for how long the guard's process waited for a processor [s].
     """
     spans: Spans = {}
 
     def span(name: str, meanwhile: Callable[[float], object] = wait) -> None:
         wait(_SETTLE_TIME)
-        began = time.monotonic()
+        began, before = time.monotonic(), waited(pid)
         meanwhile(seconds)
-        spans.setdefault(name, []).append((began, time.monotonic()))
+        spans.setdefault(name, []).append((began, time.monotonic(), waited(pid) - before))
 
     for _ in range(rounds):
         span("no page")
@@ -86,12 +91,13 @@ def print_lateness(recording: Path, spans: Spans) -> None:
         late += [(block.time, block.time - 1e-6 * frame.clock_us) for frame in decoder.feed(block.payload)]
     least = min(value for _, value in late)
     for name, times in spans.items():
-        parts = [[1e3 * (value - least) for at, value in late if since <= at < until] for since, until in times]
+        parts = [[1e3 * (value - least) for at, value in late if since <= at < until] for since, until, _ in times]
+        ready = sum(spent for *_, spent in times) / sum(until - since for since, until, _ in times)
         whole = [value for part in parts for value in part]
         each = ", ".join(f"{quantile(part, 0.99):.2f}" for part in parts)
         middle, late_one = quantile(whole, 0.5), quantile(whole, 0.99)
         print(f"a frame at the guard, {name}: {middle:.2f} ms (median), {late_one:.2f} (p99; rounds: {each}), "
-              f"{max(whole):.1f} (most) of {len(whole)}")  # fmt: skip
+              f"{max(whole):.1f} (most) of {len(whole)}; it waited {1e3 * ready:.2f} ms a second")  # fmt: skip
 
 
 class _Drawn:
@@ -108,7 +114,7 @@ class _Drawn:
 def _crowd(url: str, count: int) -> Iterator[None]:
     """Let viewers look from a process that gives way."""
     program = [sys.executable, "-m", "bench.view.viewer", url, "--viewers", str(count)]
-    child = subprocess.Popen(program)
+    child = subprocess.Popen(program, start_new_session=True)
     try:
         yield
     finally:

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bench.faults.setup import give_precedence
 from bench.report import head, quantile
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.guard.signals.journal import EventName
@@ -44,7 +45,7 @@ def page_of(recording: Path) -> tuple[subprocess.Popen[str], str, float]:
     """Start the page beside the guard; its process, address, and how long that took [s]."""
     began = time.monotonic()
     command = [sys.executable, "-m", "coneskin", "view", str(recording), "--no-browser", "--json", "--port", "18300"]
-    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     assert child.stdout is not None
     return child, json.loads(child.stdout.readline())["url"], time.monotonic() - began
 
@@ -191,7 +192,10 @@ def main() -> None:
 
             driver = stack.enter_context(sync_playwright())
             box_url = stack.enter_context(served_box())
-        with SimulatedController("UR5e", host, START), guard(scene, recording=recording) as session:
+        with SimulatedController("UR5e", host, START) as arm, guard(scene, recording=recording) as session:
+            children = session._processes.children
+            for hardware in (arm.pid, children["skin"].pid):  # which waits for no processor of this computer
+                give_precedence(hardware)
             with served(recording) as (pid, url):
                 if driver is not None:
                     look(driver, box_url, url, lambda: moving(session), args.seconds)
@@ -204,5 +208,6 @@ def main() -> None:
                     lambda seconds: session.wait_for(("none",), seconds),
                     args.rounds,
                     args.seconds,
+                    children["guard"].pid,
                 )
         print_lateness(recording, spans)

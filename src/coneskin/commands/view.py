@@ -122,6 +122,8 @@ def _follow(args: argparse.Namespace, stage: Stage, find: Callable[[LiveRun | No
 
     if hasattr(os, "nice"):
         os.nice(_NICE_LEVEL)
+    if sys.platform == "linux":
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))  # what wakes here interrupts nothing that runs
     with _server(args) as server, contextlib.closing(LivePage(server, stage, find)) as page:
         page.serve(show_page(args, server.url, _PAGE_WORDS))
     return 0

@@ -23,6 +23,7 @@ from .traces import trace_drawings
 
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _POLL_PERIOD = 0.008  # s between two looks at the recording
+_UNSEEN_PERIOD = 0.25  # s between two of either while nobody looks, so that a page costs the guard next to nothing
 _TEXT_PERIOD = 0.2  # s between two changes of the text: a processor that draws the arm draws it too
 _PLOT_PERIOD = 0.5  # s between two changes of timeline, traces and potentials
 _ROOT_NODE = "/run"
@@ -68,7 +69,8 @@ class LivePage:
                 self.draw(now)
                 if now >= due:  # the next one on time, unless this one was late by more than that
                     due = max(due, now - _PICTURE_PERIOD) + _PICTURE_PERIOD
-            over.wait(max(0.0, min(_POLL_PERIOD, due - time.monotonic())))
+            seen = self._server.gate.viewers
+            over.wait(max(0.0, min(_POLL_PERIOD, due - time.monotonic())) if seen else _UNSEEN_PERIOD)
 
     def poll(self, now: float) -> bool:
         """Take what is new; return whether an event is among it.
