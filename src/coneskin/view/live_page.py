@@ -73,11 +73,7 @@ class LivePage:
             over.wait(max(0.0, min(_POLL_PERIOD, due - time.monotonic())) if seen else _UNSEEN_PERIOD)
 
     def poll(self, now: float) -> bool:
-        """Take what is new; return whether an event is among it.
-
-        Args:
-            now: the clock [s].
-        """
+        """Take what is new at a time of the clock [s]; return whether an event is among it."""
         if self._run is None or self._run.ended or self._run.silence > _SEARCH_SILENCE:
             found = self._search(now)
             if found or self._run is None:
@@ -107,11 +103,7 @@ class LivePage:
         return found is not None
 
     def draw(self, now: float) -> None:
-        """Show the newest moment.
-
-        Args:
-            now: the clock [s].
-        """
+        """Show the newest moment at a time of the clock [s]."""
         texted = now - self._texted >= _TEXT_PERIOD
         if self._run is None:
             _set(self._status, status([(self._stage.title, UNKNOWN, _AT_REST)]))
