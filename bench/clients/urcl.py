@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.faults.setup import give_precedence
+from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL
 from coneskin.robot.sim.process import SimulatedController, free_host
 
 #: joint positions with which Universal Robots' own simulator starts [rad]
@@ -70,6 +71,8 @@ OWN_SERVER_WORDS = (
 
 #: URScript of the library's wait_program.urp, which PolyScope would write beside it
 _WAIT_PROGRAM = "def wait_program():\n  while True:\n    sleep(0.01)\n    sync()\n  end\nend\n"
+#: and of its external_control.urp, whose node takes its script from the client
+_EXTERNAL_CONTROL = f"def external_control():\n  {EXTERNAL_CONTROL}\nend\n"
 
 
 class Trial(NamedTuple):
@@ -154,6 +157,7 @@ def robot(source: Path, options: dict[str, Any]) -> Iterator[str]:
             if path.is_file():
                 (Path(folder) / path.name).write_bytes(path.read_bytes())
         (Path(folder) / "wait_program.script").write_text(_WAIT_PROGRAM)
+        (Path(folder) / "external_control.script").write_text(_EXTERNAL_CONTROL)
         with controller(programs=Path(folder), **options) as simulated:
             yield simulated.host
 

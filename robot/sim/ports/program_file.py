@@ -1,15 +1,12 @@
 """Programs that the dashboard can load: the folder that stands for the disk, and program files as URScript.
 
-A ``.urp`` file is XML, packed with gzip or not. PolyScope writes the URScript of a program beside it, in a ``.script``
-file of the same name, and that is what runs. Without one, only a program whose single node is External Control is
-loaded.
+PolyScope writes the URScript of a program beside its ``.urp`` file, in a ``.script`` file of the same name, and that is
+what runs. A line in it may stand for the script of an External Control node.
 """
 
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ET
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,9 +16,6 @@ from coneskin.robot.sim.urscript.values import ScriptError
 
 #: line that stands for the script of an External Control node until ``play`` has asked for it
 EXTERNAL_CONTROL = "# script of the node External Control"
-_EXTERNAL_CONTROL_CLASS = "com.fzi.externalcontrol.ExternalControlNode"
-_WITHOUT_EFFECT = ("Comment", "Folder", "InitVariablesNode")
-_GZIP_WINDOW = 31  # window bits for zlib: the largest, in gzip's format
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,43 +44,13 @@ class ProgramFile:
         return match[1] if match else ""
 
 
-def _read_program(name: str, data: bytes) -> str:
-    """Return the URScript of a program file.
-
-    Args:
-        name: of the file, with ``.urp`` or ``.script``.
-        data: its content.
-
-    Raises:
-        ScriptError: it is none of them, or a ``.urp`` of other nodes than External Control.
-    """
+def _program_text(name: str, data: bytes) -> str:
+    """Return the URScript of a ``.script`` file: as it is, or as the body of a program of the file's name."""
+    text = data.decode("utf-8", "replace")
+    lines = (line.strip() for line in text.splitlines())
+    first = next((line for line in lines if line and not line.startswith("#")), "")
     function = re.sub(r"\W", "_", name.rpartition(".")[0]) or "program"
-    if not name.endswith(".urp"):
-        text = data.decode("utf-8", "replace")
-        lines = (line.strip() for line in text.splitlines())
-        first = next((line for line in lines if line and not line.startswith("#")), "")
-        return text if first.startswith("def ") else f"def {function}():\n{text}\nend\n"
-    try:
-        if data[:2] == b"\x1f\x8b":
-            data = zlib.decompressobj(_GZIP_WINDOW).decompress(data, MAX_LENGTH)
-        if b"<!DOCTYPE" in data:
-            raise ScriptError(f"{name} is not a program: it declares a document type")
-        root = ET.fromstring(data)
-    except (zlib.error, ET.ParseError) as exc:
-        raise ScriptError(f"{name} is not a program: {exc}") from exc
-    main = root.find("./children/MainProgram")
-    if main is None:
-        raise ScriptError(f"{name} has no main program")
-    nodes = [node for node in root.iterfind(".//children/*") if node is not main and node.tag not in _WITHOUT_EFFECT]
-    if [node.get("strategyClass") for node in nodes] != [_EXTERNAL_CONTROL_CLASS]:
-        kinds = dict.fromkeys(node.get("strategyProgramNodeType") or node.tag for node in nodes)
-        raise ScriptError(
-            f"{name} has the nodes {', '.join(kinds) or 'of an empty program'}, and only a single External Control is "
-            "simulated; save its .script file beside the program"
-        )
-    once = main.get("runOnlyOnce") == "true"
-    body = [EXTERNAL_CONTROL] if once else ["while True:", EXTERNAL_CONTROL, "sync()", "end"]
-    return "\n".join([f"def {function}():", *body, "end", ""])
+    return text if first.startswith("def ") else f"def {function}():\n{text}\nend\n"
 
 
 #: where PolyScope has its programs, on a robot and in Universal Robots' own simulator
@@ -131,16 +95,20 @@ class ProgramFolder:
         Raises:
             FileNotFoundError: there is no such file.
             OSError: it cannot be read, or is too long.
-            ScriptError: it is not a program, or not one that is simulated.
+            ScriptError: it has no ``.script`` file beside it.
         """
-        path = source = self.locate(name)
+        path = self.locate(name)
         if not path.is_file():
             raise FileNotFoundError(name)
-        if path.suffix == ".urp" and (beside := path.with_suffix(".script")).is_file():
-            source = beside
+        source = path.with_suffix(".script") if path.suffix == ".urp" else path
+        if not source.is_file():
+            raise ScriptError(
+                f"{name} has no {source.name} beside it, which PolyScope writes with it. For one of the "
+                f"node External Control alone, write that file, with the line {EXTERNAL_CONTROL!r}"
+            )
         assert self.root is not None
         shown = f"{_PROGRAM_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
-        return ProgramFile(path.name, shown, _read_program(source.name, read_file(source, _MAX_PROGRAM_SIZE)))
+        return ProgramFile(path.name, shown, _program_text(path.name, read_file(source, _MAX_PROGRAM_SIZE)))
 
     def has(self, name: str) -> bool:
         """Return whether there is such a file."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +9,18 @@ from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.dashboard import Dashboard
+from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL
 from coneskin.robot.sim.ports.user_interface import UserInterface
 from coneskin.robot.sim.urscript.translator import Translation, translate
 
-WAIT = '<Wait type="Sleep"><waitTime>0.01</waitTime></Wait>'
-EXTERNAL = (
-    '<Contributed strategyClass="com.fzi.externalcontrol.ExternalControlNode" '
-    'strategyProgramNodeType="External Control"><dataModel/></Contributed>'
-)
+WAIT = "def wait():\n  while True:\n    sleep(0.01)\n  end\nend\n"
+EXTERNAL = f"def external_control():\n  {EXTERNAL_CONTROL}\nend\n"
 
 
-def packed(nodes: str, once: str = "false") -> bytes:
-    """Return a ``.urp`` file with these nodes."""
-    main = f'<MainProgram runOnlyOnce="{once}"><children>{nodes}</children></MainProgram>'
-    return gzip.compress(f"<URProgram><children><InitVariablesNode/>{main}</children></URProgram>".encode(), mtime=0)
+def save_program(folder: Path, name: str, script: str) -> None:
+    """Write a ``.urp`` file as PolyScope does, with its script beside it."""
+    (folder / f"{name}.urp").write_bytes(b"")
+    (folder / f"{name}.script").write_text(script)
 
 
 class Console:

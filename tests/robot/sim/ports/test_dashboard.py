@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.robot.sim.ports.dashboard import Dashboard, available
-from tests.robot.sim.ports.console import WAIT, Console, packed
+from tests.robot.sim.ports.console import WAIT, Console, save_program
 from tests.support.paths import ROOT
 
 
@@ -16,9 +16,8 @@ from tests.support.paths import ROOT
 def console(tmp_path: Path) -> Console:
     (tmp_path / "cell").mkdir()
     for folder in (tmp_path, tmp_path / "cell"):
-        (folder / "wait.urp").write_bytes(packed(WAIT))
-        (folder / "wait.script").write_text("def wait():\n  while True:\n    sleep(0.01)\n  end\nend\n")
-    (tmp_path / "grip.urp").write_bytes(packed('<Force type="Simple"/>'))
+        save_program(folder, "wait", WAIT)
+    (tmp_path / "grip.urp").write_bytes(b"")
     (tmp_path / "default.installation").write_bytes(b"")
     return Console(tmp_path)
 

@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from coneskin.robot.sim.ports.user_interface import _ScriptRequest
-from tests.robot.sim.ports.console import EXTERNAL, Console, packed
+from tests.robot.sim.ports.console import EXTERNAL, Console, save_program
 
 
 def wait_for(request: _ScriptRequest) -> str | OSError:
@@ -43,7 +43,7 @@ def test_nobody_there_is_said() -> None:
 
 
 def test_play_starts_what_the_other_program_answers(tmp_path: Path) -> None:
-    (tmp_path / "external_control.urp").write_bytes(packed(EXTERNAL, once="true"))
+    save_program(tmp_path, "external_control", EXTERNAL)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         console = Console(tmp_path, external_control=listener.getsockname())
         script = b"write_output_integer_register(3, 7)\nsleep(9)\n"
@@ -60,7 +60,7 @@ def test_play_starts_what_the_other_program_answers(tmp_path: Path) -> None:
 
 
 def test_play_without_an_answer_is_told_as_a_failed_program(tmp_path: Path) -> None:
-    (tmp_path / "external_control.urp").write_bytes(packed(EXTERNAL, once="true"))
+    save_program(tmp_path, "external_control", EXTERNAL)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         address = listener.getsockname()
     console = Console(tmp_path, external_control=address)
@@ -73,7 +73,7 @@ def test_play_without_an_answer_is_told_as_a_failed_program(tmp_path: Path) -> N
 
 
 def test_stop_forgets_a_script_that_is_still_to_come(tmp_path: Path) -> None:
-    (tmp_path / "external_control.urp").write_bytes(packed(EXTERNAL, once="true"))
+    save_program(tmp_path, "external_control", EXTERNAL)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         console = Console(tmp_path, external_control=listener.getsockname())
         console.say("load external_control.urp")
