@@ -179,12 +179,12 @@ def _ask(worker: subprocess.Popen[bytes], text: str) -> Translation | ScriptErro
     try:
         _send(worker.stdin, pickle.dumps(text))
         (length,) = _LENGTH_PREFIX.unpack(worker.stdout.read(_LENGTH_PREFIX.size))
-        name, secondary, code, problem = pickle.loads(worker.stdout.read(length))
+        made, code = pickle.loads(worker.stdout.read(length))
     finally:
         deadline.cancel()
-    if problem:
-        return ScriptError(problem.pop("message"), **problem)
-    return Translation(name, secondary, marshal.loads(code))
+    if code:
+        return Translation(code=marshal.loads(code), text=text, **made)
+    return ScriptError(made.pop("message"), **made)
 
 
 def serve() -> None:
@@ -195,15 +195,15 @@ def serve() -> None:
 
 
 def _serve(source: IO[bytes], target: IO[bytes]) -> None:
-    answer: tuple[str, bool, bytes, dict[str, object]]
+    answer: tuple[dict[str, object], bytes]
     while len(head := source.read(_LENGTH_PREFIX.size)) == _LENGTH_PREFIX.size:
         text = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
         try:
             made = _translate(text)
-            answer = (made.name, made.secondary, marshal.dumps(made.code), {})
+            facts = {name: getattr(made, name) for name in ("name", "secondary", "lines", "names")}
+            answer = (facts, marshal.dumps(made.code))
         except ScriptError as exc:
-            problem = {"message": str(exc), "title": exc.title, "line": exc.line, "column": exc.column}
-            answer = ("", False, b"", problem)
+            answer = ({"message": str(exc), "title": exc.title, "line": exc.line, "column": exc.column}, b"")
         _send(target, pickle.dumps(answer))
 
 

@@ -25,7 +25,7 @@ from .machine.controller import Controller
 from .machine.states import PORTS
 from .motion.arm import CYCLE
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
-from .ports.client_interface import Publisher, ScriptPort
+from .ports.client_interface import Publisher, ScriptPort, interpreter_reply
 from .ports.dashboard import WELCOME, Dashboard
 from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
@@ -37,7 +37,7 @@ _SERVICE_PORTS = {
     "rtde": ("RTDE",),
     "dashboard": ("dashboard",),
     "scripts": ("primary", "secondary", "realtime"),
-    "network": ("RTDE", "dashboard", "primary", "secondary", "realtime"),
+    "network": tuple(PORTS),
 }
 
 
@@ -343,6 +343,8 @@ class Server:
             return Client(sock, LineReader(reply), left=lambda: dashboard.left)
         if name == "faults":
             return Client(sock, LineReader(self.faults.answer))
+        if name == "interpreter":
+            return Client(sock, LineReader(partial(interpreter_reply, self.controller)))
         port = ScriptPort(self.controller, self._program, messages=name == "primary")
         return Client(sock, port, left=lambda: port.left)
 

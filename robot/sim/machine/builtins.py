@@ -21,7 +21,7 @@ from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.path import Path
-from coneskin.robot.sim.urscript.value_functions import ValueFunctions
+from coneskin.robot.sim.urscript.value_functions import MAX_LINE, ValueFunctions, written
 from coneskin.robot.sim.urscript.values import (
     Array,
     PoseValue,
@@ -67,15 +67,27 @@ class Builtins(
         yield
 
     def sleep(self, t: float) -> Wait:
-        """Wait for a time [s]."""
-        for _ in range(round(t / self._host.steptime)):
+        """Wait for a time [s], at least for a cycle."""
+        for _ in range(max(1, round(t / self._host.steptime)) if t > 0.0 else 0):
             yield
 
     def textmsg(self, *words: Any) -> None:
         """Write a line to the log, and tell it to the clients."""
-        text = "".join(map(show, words))
+        text = "".join(map(written, words))[:MAX_LINE]
         self._host.log("text", text=text)
         self._host.tell(TextNotice(text))
+
+    def interpreter_mode(self, clearQueueOnEnter: Any = True, clearOnEnd: Any = True) -> Wait:
+        """Execute statements that come on the interpreter's port, until one of them or a thread ends that."""
+        yield from self._program.interpreter.run(bool(clearQueueOnEnter), bool(clearOnEnd))
+
+    def end_interpreter(self) -> None:
+        """End interpreter mode."""
+        self._program.interpreter.end()
+
+    def clear_interpreter(self) -> None:
+        """Forget what statements of interpreter mode have defined."""
+        self._program.interpreter.clear()
 
     def popup(self, s: Any = "", title: Any = "Popup", warning: Any = False, error: Any = False, **_: Any) -> None:
         """Write a line to the log, and tell it to the clients; nobody is there to close a blocking one."""

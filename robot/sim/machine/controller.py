@@ -279,13 +279,11 @@ class Controller:
     # programs
 
     def program_arrived(self) -> None:
-        """End the running program, because the last byte of a new one has come; the new one starts after the delay."""
-        if self.ready:
-            self.stop_program("replaced by another")
+        """Note that the last byte of a program has come: it starts after the delay, once it is translated."""
         self._arrived = self.cycle
 
     def load(self, translation: Translation) -> None:
-        """Start a translated program: a ``sec`` program now, another once the start delay is over."""
+        """Start a translated program: a ``sec`` program now; another ends the running one, and waits for the delay."""
         if translation.secondary:
             if len(self.secondary) >= _MAX_SECONDARY:
                 self._refuse(translation.name, f"{_MAX_SECONDARY} sec programs run already")
@@ -293,6 +291,8 @@ class Controller:
                 self.secondary.append(Program(self, translation))
                 self.tell(ProgramNotice(translation.name, "STARTED"))
             return
+        if self.ready:
+            self.stop_program("replaced by another")
         delay = max(1, round(self.options.start_delay / CYCLE))
         self._due = (self._arrived + delay, translation)
 

@@ -44,9 +44,6 @@ class ForceFunctions:
 
     # measured forces
 
-    def zero_ftsensor(self) -> None:
-        """Take the measured force as zero: what a client gives instead of a sensor stays."""
-
     def enable_external_ft_sensor(self, enable: Any, *_: Any, **__: Any) -> None:
         """Take forces and torques from RTDE's external_force_torque."""
         self._host.inputs.external_forces = bool(enable)
@@ -73,9 +70,6 @@ class ForceFunctions:
         if any(on and wanted for on, wanted in zip(selected, numbers(wrench, 6, "a wrench"), strict=True)):
             self._tell_not_simulated("the motion of force_mode with a wanted force; the arm holds")
 
-    def end_force_mode(self) -> None:
-        """End force mode."""
-
     def force_mode_set_damping(self, damping: float) -> None:
         """Set the damping of force mode, 0..1: no effect."""
         self._program.damping = min(1.0, max(0.0, number(damping, "a damping")))
@@ -91,18 +85,6 @@ class ForceFunctions:
     def force_mode_get_gain_scaling(self) -> float:
         """Return the gain of force mode."""
         return self._program.gain_scaling
-
-    def freedrive_mode(self, freeAxes: Any = None, feature: Any = None) -> None:
-        """Let the arm be moved by hand: nobody does, and it holds."""
-
-    def end_freedrive_mode(self) -> None:
-        """End freedrive."""
-
-    def teach_mode(self) -> None:
-        """Let the arm be moved by hand: nobody does, and it holds."""
-
-    freedrive_mode_no_incorrect_payload_check = teach_mode
-    end_teach_mode = end_freedrive_mode
 
     def get_freedrive_status(self) -> int:
         """Return 0: freedrive is not restricted by a position close to a limit."""

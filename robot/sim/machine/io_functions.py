@@ -1,6 +1,8 @@
 """URScript functions of registers, inputs and outputs, and those that PolyScope writes from a robot's installation.
 
-Modes of the tool's connector are told to clients. Nothing is wired to the tool's serial line, nobody pushes an arm in
+Functions of devices that are not there (Modbus units, encoders, Euromap, screwdrivers) answer as a controller whose
+device is not connected: a program goes on, and the log and every client of the primary interface are told once. Modes
+of the tool's connector are told to clients. Nothing is wired to the tool's serial line, nobody pushes an arm in
 freedrive, and the safety system does not choose how hard it goes to another mode: these take no effect.
 
 Source: Universal Robots, "The URScript Programming Language", modules interfaces and motion.
@@ -8,14 +10,14 @@ Source: Universal Robots, "The URScript Programming Language", modules interface
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Callable, Container, Mapping
 from typing import Any
 
-from coneskin.robot.sim.urscript.values import ScriptError, number, show
+from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 from coneskin.robot.ur.rtde_codec import VARIABLES
 
 from .inputs_outputs import CURRENT, VOLTAGE
-from .script_host import ScriptHost
+from .script_host import CallingProgram, ScriptHost
 
 _REGISTERS, _BITS = 48, 128
 _INPUT_ACTION_NAMES = ("pause", "stop", "ignore")
@@ -36,6 +38,30 @@ class IoFunctions:
     """URScript functions of registers, inputs and outputs."""
 
     _host: ScriptHost
+    _program: CallingProgram
+    _tell_not_simulated: Callable[[str], None]
+
+    # devices that are not there
+
+    def modbus_add_signal(self, IP: Any, slave: int, address: int, type: int, name: Any, *rest: Any) -> None:
+        """Add a signal of a Modbus unit: bits of types 0 and 1, else registers, so many as the second of the rest."""
+        del IP, slave, address
+        self._add_signal(name, False if type in (0, 1) else 0, rest[1] if len(rest) > 1 else 1)
+
+    def modbus_add_rw_signal(self, IP: Any, slave: int, read: int, count: int, *rest: Any) -> None:
+        """Add registers of a Modbus unit that are read and written."""
+        del IP, slave, read
+        self._add_signal(rest[2], 0, count)
+
+    def _add_signal(self, name: Any, value: Any, count: Any) -> None:
+        self._tell_not_simulated("modbus_add_signal: no unit is connected")
+        self._program.signals[str(name)] = value if count == 1 else make_list([value] * int(count))
+
+    def modbus_get_signal_status(self, name: Any, *_: Any) -> Any:
+        """Return the value of a signal as it is before a unit has answered."""
+        if str(name) not in self._program.signals:
+            raise ScriptError(f"there is no Modbus signal {show(name)}")
+        return self._program.signals[str(name)]
 
     # registers
 
@@ -156,48 +182,6 @@ class IoFunctions:
         index = index_of(n, 2)
         self._host.terminals.tool_drive_modes[index] = int(_one_of(mode, (1, 2, 3), "the mode of a tool output"))
 
-    def set_tool_communication(
-        self, enabled: Any, baud_rate: int, parity: int, stop_bits: int, rx_idle_chars: float, tx_idle_chars: float
-    ) -> None:
-        """Set up the tool's serial line, to which nothing is wired."""
-        if not isinstance(enabled, bool):
-            raise ScriptError(f"the tool's serial line is enabled by True or False, got {show(enabled)}")
-        _one_of(baud_rate, _BAUD_RATES, "a baud rate of the tool [bit/s]")
-        _one_of(parity, (0, 1, 2), "the parity (none, odd, even)")
-        _one_of(stop_bits, (1, 2), "the number of stop bits")
-        for name, value, least in (("rx_idle_chars", rx_idle_chars, 1.0), ("tx_idle_chars", tx_idle_chars, 0.0)):
-            if not least <= number(value, name) <= 40.0:
-                raise ScriptError(f"{name} is from {least:g} to 40, got {show(value)}")
-
-    # actions of inputs
-
-    def set_input_actions_to_default(self) -> None:
-        """Take all actions from all inputs."""
-
-    def set_standard_digital_input_action(self, port: int, action: Any) -> None:
-        """Let a standard input switch freedrive, or nothing."""
-        self._check_action(port, 8, action)
-
-    set_configurable_digital_input_action = set_standard_digital_input_action
-
-    def set_tool_digital_input_action(self, port: int, action: Any) -> None:
-        """Let an input of the tool switch freedrive, or nothing."""
-        self._check_action(port, 2, action)
-
-    def set_gp_boolean_input_action(self, port: int, action: Any) -> None:
-        """Let a boolean register that clients write switch freedrive, or nothing."""
-        self._check_action(port, 128, action)
-
-    def _check_action(self, port: Any, count: int, action: Any) -> None:
-        index_of(port, count)
-        _one_of(action, _INPUT_ACTIONS, "the action of an input")
-
-    # safety
-
-    def set_safety_mode_transition_hardness(self, type: Any) -> None:
-        """Choose how the arm goes from one safety mode to another: 0 softly, 1 hard."""
-        _one_of(type, (0, 1), "the hardness of a transition")
-
 
 def _add_digital(infix: str, first: int, count: int) -> None:
     """Add the functions of digital inputs and outputs of one kind: ``get_{infix}digital_in`` and so on."""
@@ -216,11 +200,91 @@ def _add_digital(infix: str, first: int, count: int) -> None:
     setattr(IoFunctions, f"set_{infix}digital_out", set_out)
 
 
+def _add_absent(name: str, answer: Any) -> None:
+    """Add a function of a device that is not there, or of what this arm has not: it takes anything."""
+
+    def call(self: IoFunctions, *_: Any, **__: Any) -> Any:
+        self._tell_not_simulated(name)
+        return answer
+
+    setattr(IoFunctions, name, call)
+
+
+def _add_without_effect(name: str, parameters: Mapping[str, range | tuple[Any, ...] | None]) -> None:
+    """Add a function that checks what it is given, and does nothing else."""
+
+    def call(_: IoFunctions, *values: Any, **named: Any) -> None:
+        given = dict(zip(parameters, values, strict=False)) | named
+        if len(values) + len(named) > len(given) or not given.keys() <= parameters.keys():
+            raise ScriptError(f"{name} takes {', '.join(parameters) or 'nothing'}")
+        for parameter, allowed in parameters.items():
+            value = given.get(parameter)
+            if isinstance(allowed, range) and not allowed[0] <= number(value, parameter) <= allowed[-1]:
+                raise ScriptError(f"{parameter} is from {allowed[0]} to {allowed[-1]}, got {show(value)}")
+            if isinstance(allowed, tuple):
+                _one_of(value, allowed, parameter)
+
+    setattr(IoFunctions, name, call)
+
+
+#: answer -> functions that give it
+_ABSENT_DEVICES: tuple[tuple[Any, str], ...] = (
+    (-0x20000, "modbus_get_error"),  # "disconnected" in the upper 16 bits
+    (
+        0,
+        """encoder_get_tick_count encoder_unwind_delta_tick_count get_conveyor_tick_count read_port_register
+        modbus_get_time_since_signal_invalid""",
+    ),
+    (1.0, "jerk_gain_scaling_get motion_version_get"),
+    (False, "get_euromap_input get_euromap_output read_port_bit"),
+    (Array((0.0,) * 3), "get_base_acceleration"),
+    (PoseValue((0.0,) * 6), "path_offset_get"),
+    (Struct(mass=0.0, cog=Array((0.0,) * 3)), "estimate_payload"),
+    (
+        None,
+        """conveyor_pulse_decode encoder_enable_pulse_decode encoder_enable_set_tick_count encoder_set_tick_count
+        end_screw_driving high_holding_torque_disable high_holding_torque_enable jerk_gain_scaling_set
+        modbus_delete_signal modbus_request_update_signal_value modbus_reset_connection modbus_send_custom_command
+        modbus_set_digital_input_action modbus_set_output_register modbus_set_output_signal
+        modbus_set_runstate_dependent_choice modbus_set_signal_update_frequency modbus_set_signal_watchdog
+        motion_version_set path_offset_disable path_offset_enable path_offset_set path_offset_set_alpha_filter
+        path_offset_set_max_offset pause_on_error_code position_deviation_warning powerdown reset_revolution_counter
+        screw_driving set_base_acceleration set_baselight_iec set_baselight_off set_baselight_solid
+        set_conveyor_tick_count set_euromap_output set_euromap_runstate_dependent_choice
+        set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
+        set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
+        set_runstate_tool_digital_output_to_value stop_conveyor_tracking tool_wrench_limit_disable
+        tool_wrench_limit_set track_conveyor_circular track_conveyor_linear write_port_bit write_port_register""",
+    ),
+)
+_INPUT_ACTIONS = ("default", "freedrive")
+_FREEDRIVE_PARAMETERS = {"freeAxes": None, "feature": None}
+#: functions that change nothing a program or a client could see -> their parameters, and what these may be
+NO_EFFECT: dict[str, Mapping[str, range | tuple[Any, ...] | None]] = {
+    **{name: {} for name in ("end_force_mode", "end_freedrive_mode", "end_teach_mode", "teach_mode", "zero_ftsensor")},
+    **dict.fromkeys(("freedrive_mode", "freedrive_mode_no_incorrect_payload_check"), _FREEDRIVE_PARAMETERS),
+    "set_configurable_digital_input_action": {"port": range(8), "action": _INPUT_ACTIONS},
+    "set_gp_boolean_input_action": {"port": range(128), "action": _INPUT_ACTIONS},
+    "set_input_actions_to_default": {},
+    "set_safety_mode_transition_hardness": {"type": (0, 1)},
+    "set_standard_digital_input_action": {"port": range(8), "action": _INPUT_ACTIONS},
+    "set_tool_communication": {
+        "enabled": (False, True),
+        "baud_rate": (9600, 19200, 38400, 57600, 115_200, 1_000_000, 2_000_000, 5_000_000),
+        "parity": (0, 1, 2),
+        "stop_bits": (1, 2),
+        "rx_idle_chars": range(1, 41),
+        "tx_idle_chars": range(41),
+    },
+    "set_tool_digital_input_action": {"port": range(2), "action": _INPUT_ACTIONS},
+}
+for _name, _parameters in NO_EFFECT.items():
+    _add_without_effect(_name, _parameters)
+for _answer, _names in _ABSENT_DEVICES:
+    for _name in _names.split():
+        _add_absent(_name, _answer)
 for _infix, _first, _count in (("standard_", 0, 8), ("configurable_", 8, 8), ("tool_", 16, 2), ("", 0, 18)):
     _add_digital(_infix, _first, _count)
-
-_BAUD_RATES = (9600, 19200, 38400, 57600, 115_200, 1_000_000, 2_000_000, 5_000_000)
-_INPUT_ACTIONS = ("default", "freedrive")
 
 
 def _one_of(value: Any, allowed: Container[Any], name: str) -> Any:

@@ -48,6 +48,13 @@ class MoveFunctions:
             self._program.drive()  # raises if another thread has claimed the arm
             if self._arm.motion is not motion:
                 raise ScriptError("the motion was ended by the safety system")
+            if isinstance(motion, Path) and self._program.interpreter.aborts:
+                self._program.interpreter.aborts = False
+                if not radius:
+                    motion.profile.end_early()
+                    continue
+                motion.blends = True
+                return
             if radius and isinstance(motion, Path) and motion.within(self._arm, radius):
                 motion.blends = True
                 return

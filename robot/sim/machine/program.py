@@ -1,8 +1,10 @@
 """Running URScript programs of the simulated controller: their threads take turns in each control cycle.
 
 In a cycle the main thread goes first, then the others in the order in which they were started; each runs until it
-blocks. Only one thread may move the arm in a cycle: as on the real controller, a second one ends the program. ``sec``
-programs run beside the main one.
+blocks, or has used its time slice: then it goes on in the next cycle. Only one thread may move the arm in a cycle: as
+on the real controller, a second one ends the program. ``sec`` programs run beside the main one.
+
+Source: Universal Robots, "The URScript Programming Language", page "Thread scheduling".
 """
 
 from __future__ import annotations
@@ -12,15 +14,16 @@ from collections.abc import Callable, Generator, Iterator
 from inspect import isgenerator
 from typing import Any
 
-from coneskin.robot.sim.urscript.translator import Translation
-from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError
+from coneskin.robot.sim.urscript.translator import Interpreter, Translation
+from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError, call_method
 
 from .builtins import Builtins
 from .script_host import ScriptHost
 from .script_socket import ScriptSocket
+from .socket_functions import RemoteHandle
 
-_MAX_STEPS = 100_000  # iterations of loops, and calls, in one cycle; a program with more never waits, and is ended
-_MAX_TURN_TIME = 0.1  # s of the processor that a program may use in one cycle, likewise
+_MAX_STEPS = 1000  # turns of loops, and calls, of a thread in one cycle: its time slice
+_MAX_TURN_TIME = 0.004  # s of the processor that all threads of a program may use in one cycle
 _MAX_THREADS = 100  # of a program, with those that have ended in this cycle
 
 
@@ -48,8 +51,10 @@ class Program:
         current: thread that runs now.
         sockets: connections that it has opened, by their names.
         told: what its clients have been told is not simulated.
+        signals: of Modbus units, name -> value.
         damping: of force mode, 0..1.
         gain_scaling: of force mode, 0..2.
+        interpreter: of the statements that come while it runs.
     """
 
     def __init__(self, host: ScriptHost, translation: Translation) -> None:
@@ -60,6 +65,7 @@ class Program:
         self.current: Thread
         self.sockets: dict[str, ScriptSocket] = {}
         self.told: set[str] = set()
+        self.signals: dict[str, Any] = {}
         self.damping, self.gain_scaling = 0.025, 1.0  # of force mode, until the program sets them
         self._steps = 0
         self._end_time = 0.0
@@ -71,13 +77,16 @@ class Program:
             "_join": self._join,
             "_kill": self._kill,
             "_run": self._run,
-            "_count_step": self._count_step,
+            "_spent": self._spent,
+            "_method": self._call_method,
         }
         builtins = Builtins(host, self)
         space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.names()}
         exec(translation.code, space)  # the text was parsed, and nothing but its own names is in it
+        self._translation = translation
         self._main = Thread("main", space["main"]())
         self.threads = [self._main]
+        self.interpreter = Interpreter(space, translation.names, Builtins.names(), Builtins.blocking())
 
     @property
     def running(self) -> bool:
@@ -96,12 +105,11 @@ class Program:
         Raises:
             ScriptError: the program has failed, and has ended.
         """
-        self._steps = 0
         self._end_time = time.thread_time() + _MAX_TURN_TIME
         for thread in self.threads:  # threads started in this cycle are appended, and run in it
             if not thread.alive:
                 continue
-            self.current = thread
+            self.current, self._steps = thread, 0
             try:
                 next(thread.body)
             except StopIteration:
@@ -114,12 +122,9 @@ class Program:
             except _Halted:
                 self._main.alive = False
                 break
-            except ScriptError:
-                self._main.alive = False
-                raise
             except Exception as exc:  # whatever a text made Python do: it ends the program, never the controller
                 self._main.alive = False
-                raise ScriptError(f"{type(exc).__name__}: {exc}"[:1000]) from exc
+                raise self._translation.located(exc) from exc
         if len(self.threads) > 1:
             self.threads = [thread for thread in self.threads if thread.alive]
 
@@ -170,8 +175,22 @@ class Program:
     def _halt(self) -> None:
         raise _Halted
 
-    def _count_step(self) -> None:
-        """Count an iteration or a call; end a program that would hold the control cycle up."""
+    def _spent(self) -> bool:
+        """Count a turn of a loop or a call; return whether the thread has used its time slice of this cycle.
+
+        Raises:
+            ScriptError: so has a ``sec`` program, which must take no time.
+        """
         self._steps += 1
-        if self._steps > _MAX_STEPS or time.thread_time() > self._end_time:
-            raise ScriptError("an endless loop without sync() or sleep()")
+        spent = self._steps > _MAX_STEPS or time.thread_time() > self._end_time
+        if spent and self.secondary:
+            raise ScriptError("a secondary program must take no time, and this one has used its time slice")
+        return spent
+
+    def _call_method(self, base: Any, keys: Any, name: str, arguments: Any) -> Generator[None, None, tuple[Any, Any]]:
+        """Call a method of what is found in a value; return the value after it, and what the method returns."""
+        found = OPERATIONS["_at"](base, *keys)
+        if isinstance(found, RemoteHandle):
+            return base, (yield from found.call(name, arguments, self._host))
+        after, result = call_method(found, name, arguments)
+        return (base if after is found else OPERATIONS["_with"](after, keys, base)), result

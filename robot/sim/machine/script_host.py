@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from coneskin.robot.sim.motion.arm import TRIGGERED, SimulatedArm, StopCause
+from coneskin.robot.sim.urscript.translator import Interpreter
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .inputs_outputs import ClientInputs, Terminals
@@ -22,8 +23,10 @@ class CallingProgram(Protocol):
     name: str
     sockets: dict[str, ScriptSocket]
     told: set[str]
+    signals: dict[str, Any]
     damping: float
     gain_scaling: float
+    interpreter: Interpreter
 
     def drive(self) -> None:
         """Claim the arm for the thread that runs now; see `Program.drive`."""

@@ -1,10 +1,11 @@
-"""URScript functions of sockets: a program is the client of a server.
+"""URScript functions of sockets and of XML-RPC: a program is the client of a server.
 
 A read that has nothing to return by its timeout, or whose server has gone, returns at the earliest in the next cycle,
 so that a program which reads for ever gives way; so does one that is sent more than it reads. A timeout of 0 waits
-without an end.
+without an end. A pose is sent by XML-RPC as a struct of x, y, z, rx, ry and rz, and such a struct comes back as a pose.
 
-Source: Universal Robots, "The URScript Programming Language", module interfaces (socket_close to socket_set_var).
+Source: Universal Robots, "The URScript Programming Language", module interfaces (socket_close to socket_set_var,
+rpc_factory) and chapter "Remote Procedure Call (RPC)"; its article "XML-RPC communication" for the types.
 """
 
 from __future__ import annotations
@@ -12,11 +13,22 @@ from __future__ import annotations
 import math
 import re
 import struct
+import xmlrpc.client
 from collections.abc import Callable, Generator
 from typing import Any
+from urllib.parse import urlsplit
+from xml.parsers.expat import ExpatError
 
 from coneskin.robot.sim.urscript.value_functions import text_of
-from coneskin.robot.sim.urscript.values import Array, ScriptError, number, show
+from coneskin.robot.sim.urscript.values import (
+    Array,
+    PoseValue,
+    ScriptError,
+    Struct,
+    make_list,
+    number,
+    show,
+)
 
 from .script_host import CallingProgram, ScriptHost
 from .script_socket import ScriptSocket, may_connect
@@ -54,6 +66,12 @@ class SocketFunctions:
         self.socket_close(socket_name)
         yield
         return False
+
+    def rpc_factory(self, type: Any, url: Any) -> RemoteHandle:
+        """Return a handle of a server of XML-RPC; its methods are those of the server."""
+        if str(type).lower() != "xmlrpc":
+            raise ScriptError(f'rpc_factory knows "xmlrpc" alone, got {show(type)}')
+        return RemoteHandle(str(url), self._host.beyond)
 
     def socket_close(self, socket_name: Any = _SOCKET_NAME) -> None:
         """Close a connection, if there is one of that name."""
@@ -223,3 +241,93 @@ def _bytes(value: Any, interpret_escape: bool) -> bytes:
         for written, meant in (("\\n", "\n"), ("\\r", "\r"), ("\\t", "\t"), ("\\\\", "\\")):
             text = text.replace(written, meant)
     return text.encode()
+
+
+_ANSWER_TIME = 60.0  # s that a server has for its answer; an assumption
+_POSE_MEMBERS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+class RemoteHandle:
+    """Handle of a server of procedures.
+
+    Args:
+        url: of the server.
+        beyond: whether it may be another computer.
+
+    Raises:
+        ScriptError: the URL is not one, or the program may not connect to it.
+    """
+
+    def __init__(self, url: str, beyond: bool) -> None:
+        parts = urlsplit(url)
+        try:
+            port = parts.port or 80
+        except ValueError:
+            port = 0
+        if parts.scheme != "http" or not parts.hostname or not port:
+            raise ScriptError(f'rpc_factory takes a URL such as "http://127.0.0.1:8000/RPC2", got {show(url)}')
+        self._address = may_connect(parts.hostname, beyond), port
+        self._path = (parts.path or "/RPC2").encode("ascii", "replace")
+
+    def call(self, name: str, arguments: Any, host: ScriptHost) -> Generator[None, None, Any]:
+        """Call a procedure, and return its result.
+
+        Raises:
+            ScriptError: there is no server, no answer, or the answer is a fault: each ends the program, as on a robot.
+        """
+        if name == "closeXMLRPCClientConnection":
+            return None
+        body = xmlrpc.client.dumps(tuple(map(_to_python, arguments)), name, allow_none=True).encode()
+        head = b"POST %b HTTP/1.0\r\nHost: robot\r\nContent-Type: text/xml\r\nContent-Length: %d\r\n\r\n"
+        connection = ScriptSocket(*self._address)
+        try:
+            while (connected := connection.connect()) is None:
+                yield
+            if not (connected and connection.send(head % (self._path, len(body)) + body)):
+                raise ScriptError(f"{name}: no server answers at {self._address[0]} port {self._address[1]}")
+            end = host.outside_time() + _ANSWER_TIME
+            while not connection.ended:
+                connection.fill()
+                if host.outside_time() > end:
+                    raise ScriptError(f"{name}: the server has not answered within {_ANSWER_TIME:g} s")
+                yield
+            answer = bytes(connection.unread)
+        finally:
+            connection.close()
+        return _result(name, answer)
+
+
+def _result(name: str, answer: bytes) -> Any:
+    """Return what an answer in HTTP holds."""
+    status, _, text = answer.partition(b"\r\n\r\n")
+    if b" 200 " not in status.partition(b"\r\n")[0] or b"<!DOCTYPE" in text:
+        raise ScriptError(f"{name}: the server refuses the call: {status[:99].decode('ascii', 'replace')!r}")
+    try:
+        values, _ = xmlrpc.client.loads(text)
+    except xmlrpc.client.Fault as exc:
+        raise ScriptError(f"{name}: {exc.faultString[:500]}") from exc
+    except (ExpatError, xmlrpc.client.ResponseError, ValueError, TypeError, LookupError) as exc:
+        raise ScriptError(f"{name}: the answer cannot be read: {exc}") from exc
+    return _to_script(values[0]) if values else None
+
+
+def _to_python(value: Any) -> Any:
+    if isinstance(value, PoseValue):
+        return dict(zip(_POSE_MEMBERS, map(float, value), strict=True))
+    if isinstance(value, Struct):
+        return {name: _to_python(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return list(map(_to_python, value))
+    if not isinstance(value, bool | int | float | str):
+        raise ScriptError(f"{show(value)} cannot be sent to a server")
+    return value
+
+
+def _to_script(value: Any) -> Any:
+    if isinstance(value, dict):
+        if set(value) == set(_POSE_MEMBERS):
+            return PoseValue(float(value[name]) for name in _POSE_MEMBERS)
+        return Struct({name: _to_script(item) for name, item in value.items()})
+    if isinstance(value, list):
+        return make_list(map(_to_script, value))
+    return value if isinstance(value, bool | int | float | str) else str(value)

@@ -35,6 +35,10 @@ class _Profile:
         self.length, self.speed, self.acceleration = length, speed, acceleration
         self.s = self.sdot = 0.0
 
+    def end_early(self) -> None:
+        """End the path where one that brakes now comes to rest."""
+        self.length = min(self.length, self.s + self.sdot * (0.5 * self.sdot / self.acceleration + CYCLE))
+
     def update(self, top: float, brake: float) -> None:
         left = self.length - self.s - 0.5 * self.sdot * CYCLE
         step = self.acceleration * CYCLE

@@ -37,8 +37,9 @@ from coneskin.robot.sim.machine.states import (
     Version,
 )
 from coneskin.robot.sim.motion.arm import JOINT_ACCELERATION
+from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
-from coneskin.robot.sim.urscript.values import values_of
+from coneskin.robot.sim.urscript.values import ScriptError, values_of
 
 MESSAGE = 20  #: kind of a packet that holds one message
 _TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE, _ERROR_MESSAGE, _KEY_MESSAGE, _FAILED_MESSAGE = (
@@ -346,3 +347,34 @@ class ScriptPort:
                 self._controller.log("command", line=text.strip())
                 command(self._controller)
         return b""
+
+
+def interpreter_reply(controller: Controller, line: str) -> str:
+    """Take a line of the interpreter's port (30020): statements for the running program, or a command of its own.
+
+    Source: Universal Robots, "The URScript Programming Language", chapter "Interpreter Mode".
+    """
+    statement, program = line.strip(), controller.program
+    if not statement:
+        return ""
+    if program is None:
+        return f"discard: no program is running: {statement}"
+    interpreter = program.interpreter
+    states = {
+        "statelastexecuted": interpreter.executed,
+        "statelastinterpreted": interpreter.interpreted,
+        "statelastcleared": interpreter.cleared,
+        "stateunexecuted": interpreter.unexecuted,
+    }
+    if statement in states:
+        return f"state: {states[statement]}: {statement}"
+    if statement == "skipbuffer":
+        interpreter.skip()
+    elif statement == "abort":
+        interpreter.aborts = isinstance(controller.arm.motion, Path)
+    else:
+        try:
+            interpreter.take(statement)
+        except ScriptError as exc:
+            return f"discard: {exc}: {statement}"
+    return f"ack: {interpreter.interpreted}: {statement}"

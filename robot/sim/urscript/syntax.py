@@ -1,75 +1,76 @@
-"""Parser of URScript: text to numbered lines, lines to a tree of statements, expressions to Python text.
+"""Tokens of URScript, and its expressions as Python text, by precedence climbing.
 
-Expressions are parsed by precedence climbing. In their Python text a call is written as NUL name ( arguments ) SOH, and
-a named argument as STX name = value: whether a function is the program's own, and whether it takes time, is known only
-when the whole program has been read. `translator` says what is understood.
+A line ends a statement where no bracket is open and no operator waits for its other side. ur_rtde writes a value at the
+start of the next line, and interpreter mode has whole functions in one line: both are the same to this parser.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Set
+from typing import NamedTuple
 
-from .values import MAX_ITEMS, ScriptError
-
-_UNFINISHED_LINE = re.compile(r"(?:,|\b(?:and|or|xor|not))$")  # end of a line that goes on in the next
-_LEADING_NUMBER = re.compile(r"[-+]?[\d.eE]+")
-_QUOTED_TEXT = re.compile(r"\"[^\"]*\"|'[^']*'")
+from .values import CHANGING_METHODS, MAX_ITEMS, ScriptError
 
 
-def numbered_lines(text: str) -> list[tuple[int, str]]:
-    """Return a program's lines, each with the number of its first one, from 1.
+class Token(NamedTuple):
+    """Word, number, text or sign of a program.
 
-    A line goes on in the next while a bracket is open, or after a comma or a logical operator. What PolyScope writes to
-    show where its program is, ``$ 2 "MoveJ"``, is left out. ur_rtde writes the value of ``global offset =`` at the
-    start of the next line, before that line's own statement.
+    Attributes:
+        kind: "name", "number", "string", "sign", or "end" after the last one.
+        text: as it is written.
+        line: number of its line, from 1.
+        first: True for the first one of its line.
     """
-    lines: list[tuple[int, str]] = []
-    parts: list[str] = []  # of a line that goes on
-    first = depth = 0
-    for number, raw in enumerate(text.splitlines(), 1):
-        line = (raw if "#" not in raw else _without_comment(raw)).strip()
-        if not line or line.startswith("$"):
-            continue
-        if not parts and lines and lines[-1][1].endswith("=") and (value := _LEADING_NUMBER.match(line)):
-            lines[-1] = (lines[-1][0], f"{lines[-1][1]} {value[0]}")
-            line = line[value.end() :].strip()
-            if not line:
-                continue
-        first = first if parts else number
-        parts.append(line)
-        depth = max(0, depth + _opened(line))
-        if depth == 0 and not _UNFINISHED_LINE.search(line):
-            lines.append((first, " ".join(parts)))
-            parts = []
-    return [*lines, (first, " ".join(parts))] if parts else lines
+
+    kind: str
+    text: str
+    line: int
+    first: bool
 
 
-def _opened(line: str) -> int:
-    """Return how many brackets a line opens and does not close."""
-    bare = _QUOTED_TEXT.sub("", line) if '"' in line or "'" in line else line
-    return bare.count("(") + bare.count("[") - bare.count(")") - bare.count("]")
+#: next token, after any blanks
+_NEXT_TOKEN = re.compile(
+    r"[^\S\n]*(?:(?P<line>\n)|(?P<comment>#[^\n]*)|(?P<number>0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"|(?P<string>\"[^\"\n]*\"|'[^'\n]*')|(?P<name>[A-Za-z_]\w*)|(?P<sign>==|!=|<=|>=|[-+*/%^<>=()\[\],:.!])|(?P<end>\Z))",
+    re.ASCII,
+)
+_PLACE_MARK = re.compile(r"[^\S\n]*\$[^\n]*")  # what PolyScope writes to show where its program is: $ 2 "MoveJ"
 
 
-def _without_comment(line: str) -> str:
-    quote = ""
-    for position, letter in enumerate(line):
-        if quote:
-            quote = "" if letter == quote else quote
-        elif letter in "\"'":
-            quote = letter
-        elif letter == "#":
-            return line[:position]
-    return line
+def tokens_of(text: str) -> list[Token]:
+    """Cut a program into tokens, and add an "end" to them.
+
+    Raises:
+        ScriptError: a part of it is not URScript.
+    """
+    found: list[Token] = []
+    position, line, first = 0, 1, True
+    while True:
+        if first and (mark := _PLACE_MARK.match(text, position)):
+            position = mark.end()
+        match = _NEXT_TOKEN.match(text, position)
+        if match is None:
+            raise line_error(text, line, f"{text[position:].partition(chr(10))[0].strip()[:99]!r} is not URScript")
+        position, kind = match.end(), match.lastgroup or ""
+        if kind == "line":
+            line, first = line + 1, True
+        elif kind != "comment":
+            found.append(Token(kind, match[kind], line, first or kind == "end"))
+            if kind == "end":
+                return found
+            first = False
+
+
+def line_error(text: str, line: int, problem: str, *, running: bool = False) -> ScriptError:
+    """Return the error of one line of a program, with its number and its text; also of one that was running."""
+    lines = text.split("\n")
+    words = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+    title = problem if running else f"syntax_error_on_line:{line}:{words}:"
+    return ScriptError(f"line {line}: {problem} in {words[:200]!r}", title=title, line=line, column=1)
 
 
 _MAX_DEPTH = 50  # of an expression: brackets, signs, powers
-#: next token of an expression, after any blanks
-_NEXT_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<string>\"[^\"]*\"|'[^']*')|(?P<pose>p(?=\[))"
-    r"|(?P<name>[A-Za-z_]\w*)|(?P<op>==|!=|<=|>=|[-+*/%^<>=()\[\],:.]))"
-)
 #: operators of two sides -> their Python, by rising precedence
 _BINARY_OPERATORS = (
     {"or": "({} or {})", "xor": "(bool({}) ^ bool({}))"},
@@ -79,86 +80,66 @@ _BINARY_OPERATORS = (
     {"*": "_multiply({}, {})", "/": "_divide({}, {})", "%": "_modulo({}, {})"},
 )
 _COMPARISON_LEVEL = 2
+#: words that can be no variable
+_RESERVED_WORDS = {"def", "sec", "thread", "end", "if", "elif", "else", "while", "switch", "case", "default", "return"}
+_RESERVED_WORDS |= {"break", "continue", "halt", "global", "local"}
+_NAMED_VALUES = {"True": "True", "False": "False", "None": "None"}
 
 
-class _ExpressionParser:
-    """Parser of one expression after the other.
+class ExpressionParser:
+    """Parser of expressions, in the order in which they stand in a program.
 
     Args:
-        fail: returns the error that says a problem and the line.
-        calls: takes the name of each function that an expression calls.
+        text: of the program.
+        functions: names of its own functions.
+        builtins: names of the controller's functions.
+        blocking: those of them that take time, and are therefore generators.
     """
 
-    def __init__(self, fail: Callable[[str], ScriptError], calls: Callable[[str], None]) -> None:
-        self._fail = fail
-        self._calls = calls
-        self._tokens: list[tuple[str, str]] = []
-        self._token = self._depth = 0
+    def __init__(self, text: str, functions: Set[str], builtins: Set[str], blocking: Set[str]) -> None:
+        self._text = text
+        self._functions, self._builtins, self._blocking = functions, builtins, blocking
+        self._tokens = tokens_of(text)
+        self._at = self._depth = self._brackets = 0
 
-    def parse(self, text: str) -> str:
-        """Return the expression as Python text.
+    # tokens
+
+    @property
+    def _token(self) -> Token:
+        return self._tokens[self._at]
+
+    def _next_is(self, *texts: str) -> bool:
+        """Return whether the statement goes on with one of these."""
+        kind, text, _, first = self._tokens[self._at]
+        return text in texts and kind != "string" and not (first and self._brackets == 0)
+
+    def _take(self, text: str = "") -> Token:
+        token = self._tokens[self._at]
+        if token.kind == "end" or (text and token.text != text):
+            late = token.first and (self._brackets == 0 or token.text in _RESERVED_WORDS)
+            found = "the end of the line" if late else repr(token.text) if token.text else "the end of the program"
+            raise self._fail(f"expected {text!r}, got {found}" if text else "the line ends too early", before=late)
+        self._at += 1
+        return token
+
+    def _fail(self, problem: str, before: bool = False) -> ScriptError:
+        """Return the error of the line of the next token, or of the one before it."""
+        return line_error(self._text, self._tokens[max(0, self._at - before)].line, problem)
+
+    # expressions
+
+    def expression(self, level: int = 0) -> str:
+        """Return the next expression as Python text, from one level of precedence on.
 
         Raises:
-            ScriptError: it is none.
+            ScriptError: there is none.
         """
-        self._read(text)
-        made = self._binary(0)
-        if self._token < len(self._tokens):
-            raise self._fail(f"{self._tokens[self._token][1]!r} is unexpected")
-        return made
-
-    def parameters(self, text: str) -> list[tuple[str, str]]:
-        """Return the name of each parameter of a definition, and its default as Python text: empty without one.
-
-        Raises:
-            ScriptError: the text is no list of parameters.
-        """
-        self._read(text)
-        found: list[tuple[str, str]] = []
-        while self._token < len(self._tokens):
-            kind, name = self._take()
-            if kind != "name" or any(name == known for known, _ in found) or len(found) >= MAX_ITEMS:
-                raise self._fail("parameters must be plain names, each once")
-            default = ""
-            if self._next_is("="):
-                self._take()
-                default = self._binary(0)
-            found.append((name, default))
-            if self._token < len(self._tokens):
-                self._take(",")
-        return found
-
-    def _read(self, text: str) -> None:
-        """Cut a text into tokens."""
-        self._tokens, self._token, self._depth, position = [], 0, 0, 0
-        text = text.rstrip()
-        while position < len(text):
-            match = _NEXT_TOKEN.match(text, position)
-            if match is None:
-                raise self._fail(f"{text[position:]!r} is not URScript")
-            self._tokens.append((match.lastgroup or "", match[match.lastgroup or 0]))
-            position = match.end()
-
-    def _next_is(self, *values: str) -> bool:
-        return self._token < len(self._tokens) and self._tokens[self._token][1] in values
-
-    def _take(self, value: str = "") -> tuple[str, str]:
-        if self._token >= len(self._tokens):
-            raise self._fail("the line ends too early")
-        found = self._tokens[self._token]
-        if value and found[1] != value:
-            raise self._fail(f"expected {value!r}, got {found[1]!r}")
-        self._token += 1
-        return found
-
-    def _binary(self, level: int) -> str:
-        """Parse from one level of precedence on."""
         if level == len(_BINARY_OPERATORS):
             return self._unary()
-        left = self._binary(level + 1)
+        left = self.expression(level + 1)
         while self._next_is(*_BINARY_OPERATORS[level]):
-            made = _BINARY_OPERATORS[level][self._take()[1]]
-            left = made.format(left, self._binary(level + 1))
+            made = _BINARY_OPERATORS[level][self._take().text]
+            left = made.format(left, self.expression(level + 1))
             if level == _COMPARISON_LEVEL:
                 break  # there is no a < b < c
         return left
@@ -172,11 +153,13 @@ class _ExpressionParser:
         return made
 
     def _signed(self) -> str:
-        if self._next_is("-", "+"):
-            return f"_negate({self._unary()})" if self._take()[1] == "-" else self._unary()
-        if self._next_is("not"):
+        if self._token.kind == "sign" and self._token.text in "-+!":
+            sign = self._take().text
+            made = self._unary()
+            return {"-": f"_negate({made})", "!": f"(not {made})"}.get(sign, made)
+        if self._token == ("name", "not", *self._token[2:]):
             self._take()
-            return f"(not {self._binary(_COMPARISON_LEVEL)})"
+            return f"(not {self.expression(_COMPARISON_LEVEL)})"
         base = self._postfix()
         if self._next_is("^"):
             self._take()
@@ -184,226 +167,143 @@ class _ExpressionParser:
         return base
 
     def _postfix(self) -> str:
-        made = self._atom()
-        while self._next_is("["):
+        """Parse an operand with its elements, members and calls of methods."""
+        name = self._token.text
+        made, keys = self._atom(), ""
+        variable = made == f"v_{name}"
+        while self._next_is("[", "."):
+            if self._take().text == "[":
+                keys += self._inside(self._keys)
+                continue
+            member = self._name()
+            if not self._next_is("("):
+                keys += f"{member!r}, "
+                continue
             self._take()
-            made = f"{made}[{self._binary(0)}]"
-            while self._next_is(","):
-                self._take()
-                made = f"{made}[{self._binary(0)}]"
-            self._take("]")
+            call = f"{member!r}, ({self._inside(self._arguments)})"
+            if variable and member in CHANGING_METHODS:
+                self._changed(name)
+                call = f"(_r := (yield from _method(v_{name}, ({keys}), {call}))"
+                made = f"{call}, (v_{name} := _r[0]), _r[1])[2]"
+            else:
+                made = f"(yield from _method({made}, ({keys}), {call}))[1]"
+            variable, keys = False, ""
+        return f"_at({made}, {keys})" if keys else made
+
+    def _keys(self) -> str:
+        """Parse the places of an element up to its bracket, and return them as Python text with a comma after each."""
+        made = f"{self.expression()}, "
+        while self._next_is(","):
+            self._take()
+            made += f"{self.expression()}, "
+        self._take("]")
         return made
 
+    def _name(self) -> str:
+        if self._token.kind != "name":
+            raise self._fail(f"expected a name, got {self._token.text!r}")
+        return self._take().text
+
+    def _inside(self, parse: Callable[[], str]) -> str:
+        """Parse what stands inside of brackets, where the end of a line ends nothing."""
+        self._brackets += 1
+        made = parse()
+        self._brackets -= 1
+        return made
+
+    def _changed(self, name: str) -> None:
+        """Note that a statement changes a variable."""
+
     def _atom(self) -> str:
-        kind, text = self._take()
+        kind, text, line, _ = self._take()
         if kind == "number":
+            if text[:2] in ("0x", "0X"):
+                return str(int(text, 16)) if int(text, 16) < 2**31 else f"{int(text, 16)}.0"
             whole = text.isdigit()
             return f"{text}.0" if whole and len(text) > 9 else (text.lstrip("0") or "0") if whole else text
         if kind == "string":
             return repr(text[1:-1])
-        if kind == "pose":
-            self._take("[")
-            parts = self._items("]")
-            if len(parts) == 1:  # not a pose, but an element of a variable named p
-                return f"v_p[{parts[0]}]"
-            return f"_pose(({_tuple(parts)}))"
         if text == "[":
-            return f"_list(({_tuple(self._items(']'))}))"
+            return f"_list(({self._inside(lambda: self._items(']'))}))"
         if text == "(":
-            inner = self._binary(0)
-            self._take(")")
-            return f"({inner})"
-        if kind != "name":
-            raise self._fail(f"{text!r} is unexpected")
-        if text in ("True", "False"):
-            return text
-        if text == "run":
-            name = self._take()[1]
-            self._take("(")
-            return f"_run(f_{name}, ({_tuple(self._items(')'))}))"
-        if self._next_is("("):
+            return self._inside(self._bracketed)
+        if kind != "name" or text in _RESERVED_WORDS:
+            self._at -= 1
+            raise self._fail(f"{text!r} is unexpected", before=kind == "name" and self._token.first)
+        if text in _NAMED_VALUES:
+            return _NAMED_VALUES[text]
+        if text == "p" and self._next_is("["):
             self._take()
-            self._calls(text)
-            return f"\0{text}({_tuple(self._items(')'))})\1"  # the writer knows whether it blocks
-        return f"v_{text}"
+            parts = self._inside(lambda: self._items("]"))
+            return f"_at(v_p, {parts})" if self._count == 1 else f"_pose(({parts}))"  # a variable named p has elements
+        if text == "run":
+            name = self._name()
+            self._take("(")
+            return f"_run({self._python_name(name, line)}, ({self._inside(self._arguments)}))"
+        if not self._next_is("("):
+            return f"v_{text}"
+        self._take()
+        if text == "struct":
+            return f"_struct({{{self._inside(lambda: self._arguments(members=True))}}})"
+        own = text in self._functions
+        name = self._python_name(text, line)
+        arguments = self._inside(lambda: self._arguments(prefix="v_" if own else ""))
+        return f"(yield from {name}({arguments}))" if own or text in self._blocking else f"{name}({arguments})"
 
-    def _items(self, close: str) -> list[str]:
-        parts = []
-        while not self._next_is(close):
-            if self._token + 1 < len(self._tokens) and self._tokens[self._token + 1][1] == "=":
-                parts.append(f"\2{self._take()[1]}{self._take('=')[1]}{self._binary(0)}")
-            else:
-                parts.append(self._binary(0))
-            if not self._next_is(close):
-                self._take(",")
-            if len(parts) > MAX_ITEMS:
-                raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
-        self._take(close)
-        return parts
-
-
-def _tuple(parts: list[str]) -> str:
-    return "".join(part + ", " for part in parts)
-
-
-_MAX_BLOCKS = 20  # of blocks inside each other
-_MAX_FUNCTIONS = 1000  # of one program
-
-
-@dataclass(slots=True)
-class Function:
-    """Function, ``sec`` or thread of a program: a tree of statements (kind, line number, parts...).
-
-    Attributes:
-        kind: "def", "sec" or "thread".
-        name: name of the function.
-        parameters: name of each parameter -> Python text of its default; empty without one.
-        body: its statements.
-        assigned: names that it assigns.
-        elements: names whose elements it assigns.
-        local: names that it declares local.
-        outer: names that the program's own body assigns before it.
-        calls: name of each function that it calls -> the first line that does.
-    """
-
-    kind: str
-    name: str
-    parameters: dict[str, str] = field(default_factory=dict)
-    body: list[tuple[object, ...]] = field(default_factory=list)
-    assigned: set[str] = field(default_factory=set)
-    elements: set[str] = field(default_factory=set)
-    local: set[str] = field(default_factory=set)
-    outer: frozenset[str] = frozenset()
-    calls: dict[str, int] = field(default_factory=dict)
-
-
-class Parser:
-    """Parser of statements line by line, into a tree.
-
-    It takes the lines of `numbered_lines`.
-
-    Attributes:
-        functions: name -> function defined so far.
-        globals: names declared global.
-    """
-
-    def __init__(self, lines: list[tuple[int, str]]) -> None:
-        self._lines = lines
-        self._at = self._blocks = 0
-        self.functions: dict[str, Function] = {}
-        self.globals: set[str] = set()
-        self._inside: list[Function] = []
-        self._expressions = _ExpressionParser(self._fail, self._note_call)
-
-    def program(self) -> Function:
-        """Parse the whole text: one def or sec, with the functions defined in it.
+    def _python_name(self, name: str, line: int) -> str:
+        """Return the Python name of a function.
 
         Raises:
-            ScriptError: the text is not URScript, or goes on after the program's end.
+            ScriptError: the program has none of that name, and the controller neither.
         """
-        made = self._function()
-        if self._peek() is not None:
-            raise self._fail("text after the end of the program")
+        if name in self._functions:
+            return f"f_{name}"
+        if name in self._builtins:
+            return f"b_{name}"
+        words = self._text.split("\n")[line - 1]
+        raise ScriptError(
+            f"line {line}: the controller has no function {name} in {words.strip()[:200]!r}",
+            title=f"compile_error_name_not_found:{name}:",
+            line=line,
+            column=words.find(name) + 1,
+        )
+
+    _count = 0  # of the elements that were parsed last
+
+    def _bracketed(self) -> str:
+        made = self.expression()
+        self._take(")")
+        return f"({made})"
+
+    def _items(self, close: str) -> str:
+        """Parse elements up to a bracket, as Python text with a comma after each."""
+        made, count = "", 0
+        while not self._next_is(close):
+            made += f"{self.expression()}, "
+            count += 1
+            if not self._next_is(close):
+                self._take(",")
+            if count > MAX_ITEMS:
+                raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
+        self._take(close)
+        self._count = count
         return made
 
-    def _peek(self) -> str | None:
-        return self._lines[self._at][1] if self._at < len(self._lines) else None
-
-    def _fail(self, problem: str) -> ScriptError:
-        number, line = self._lines[min(self._at, len(self._lines) - 1)]
-        title = f"syntax_error_on_line:{number}:{line}:"
-        return ScriptError(f"line {number}: {problem} in {line!r}", title=title, line=number, column=1)
-
-    def _note_call(self, name: str) -> None:
-        self._inside[-1].calls.setdefault(name, self._lines[self._at][0])
-
-    # statements
-
-    def _function(self) -> Function:
-        match = re.fullmatch(r"(def|sec|thread)\s+(\w+)\s*\((.*)\)\s*:", self._lines[self._at][1])
-        if match is None:
-            raise self._fail("expected 'def name():'")
-        if match[2] in self.functions or len(self.functions) >= _MAX_FUNCTIONS:
-            raise self._fail(f"a function is defined twice, or there are more than {_MAX_FUNCTIONS}")
-        made = Function(match[1], match[2])
-        if self._inside:
-            made.outer = frozenset(self._inside[0].assigned)
-        self.functions[made.name] = made
-        self._inside.append(made)
-        for name, default in self._expressions.parameters(match[3]):
-            made.parameters[name] = default
-        self._at += 1
-        made.body = self._block(("end",))
-        self._at += 1
-        self._inside.pop()
+    def _arguments(self, *, prefix: str = "", members: bool = False) -> str:
+        """Parse arguments up to a bracket, those with a name too, as Python text with a comma after each."""
+        made, count = "", 0
+        while not self._next_is(")"):
+            if self._token.kind == "name" and self._tokens[self._at + 1].text == "=":
+                name = self._take().text
+                self._take()
+                made += f"{name!r}: " if members else f"{prefix}{name}="
+            elif members:
+                raise self._fail("a member of a struct needs a name: struct(x=1)")
+            made += f"{self.expression()}, "
+            count += 1
+            if not self._next_is(")"):
+                self._take(",")
+            if count > MAX_ITEMS:
+                raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
+        self._take(")")
         return made
-
-    def _block(self, ends: tuple[str, ...]) -> list[tuple[object, ...]]:
-        body: list[tuple[object, ...]] = []
-        self._blocks += 1
-        if self._blocks > _MAX_BLOCKS:
-            raise self._fail(f"more than {_MAX_BLOCKS} blocks inside each other")
-        while (line := self._peek()) is not None:
-            word = re.match(r"\w*", line)
-            if word is not None and word[0] in ends:
-                self._blocks -= 1
-                return body
-            body += self._statement(line, word[0] if word else "")
-        raise self._fail("a block has no 'end'")
-
-    def _statement(self, line: str, word: str) -> Iterator[tuple[object, ...]]:
-        number = self._lines[self._at][0]
-        if word in ("def", "thread"):
-            self._function()
-            return
-        if word == "if":
-            branches = [(self._condition(line[2:]), self._block(("elif", "else", "end")))]
-            otherwise: list[tuple[object, ...]] = []
-            while (line := self._peek() or "").startswith("elif"):
-                branches.append((self._condition(line[4:]), self._block(("elif", "else", "end"))))
-            if line.startswith("else"):
-                self._at += 1
-                otherwise = self._block(("end",))
-            self._at += 1
-            yield "if", number, branches, otherwise
-            return
-        if word == "while":
-            test = self._condition(line[5:])
-            body = self._block(("end",))
-            self._at += 1
-            yield "while", number, test, body
-            return
-        yield self._simple(line, word, number)
-        self._at += 1
-
-    def _condition(self, text: str) -> str:
-        text = text.strip()
-        if not text.endswith(":"):
-            raise self._fail("expected ':' at the end")
-        test = self._expressions.parse(text[:-1])
-        self._at += 1
-        return test
-
-    def _simple(self, line: str, word: str, number: int) -> tuple[object, ...]:
-        rest = line[len(word) :].strip()
-        if word in ("break", "continue", "halt", "pause", "pass", "enter_critical", "exit_critical"):
-            return word, number
-        if word == "return":
-            return word, number, self._expressions.parse(rest) if rest else "None"
-        if word in ("kill", "join"):
-            return word, number, self._expressions.parse(rest)
-        here = self._inside[-1]
-        match = re.match(r"(?:(global|local)\s+)?([A-Za-z_]\w*)\s*((?:\[[^=\]]*\])?)\s*=(?!=)(.*)$", line)
-        if match is None:
-            return "call", number, self._expressions.parse(line)
-        scope, name, index, value = match.groups()
-        if scope == "global":
-            self.globals.add(name)
-        if index:
-            here.elements.add(name)
-            key = self._expressions.parse(index[1:-1])
-            return "element", number, name, key, self._expressions.parse(value)
-        if scope == "local":
-            here.local.add(name)
-        here.assigned.add(name)
-        return "set", number, name, self._expressions.parse(value)

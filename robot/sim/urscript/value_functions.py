@@ -18,6 +18,7 @@ from .values import (
     PoseValue,
     ScriptError,
     interpolate,
+    is_matrix,
     make_list,
     numbers,
     pose_of,
@@ -50,10 +51,22 @@ class ValueFunctions:
         return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
 
     def inv(self, m: Any) -> Any:
-        """Return the inverse of a pose; that of a matrix is not simulated."""
-        if not isinstance(m, PoseValue):
-            raise ScriptError("inv of a matrix is not simulated, only that of a pose")
-        return self.pose_inv(m)
+        """Return the inverse of a pose or of a matrix, by elimination with the largest pivots."""
+        if isinstance(m, PoseValue):
+            return self.pose_inv(m)
+        if not is_matrix(m) or any(len(row) != len(m) for row in m):
+            raise ScriptError(f"inv takes a pose or a square matrix, got {show(m)}")
+        rows = [[*map(float, row), *(float(i == j) for j in range(len(m)))] for i, row in enumerate(m)]
+        for i in range(len(rows)):
+            pivot = max(range(i, len(rows)), key=lambda n: abs(rows[n][i]))
+            if abs(rows[pivot][i]) < 1e-12:
+                raise ScriptError("inv: the matrix is singular")
+            rows[i], rows[pivot] = rows[pivot], rows[i]
+            rows[i] = [value / rows[i][i] for value in rows[i]]
+            for n, row in enumerate(rows):
+                if n != i:
+                    rows[n] = [a - row[i] * b for a, b in zip(row, rows[i], strict=True)]
+        return Array(Array(row[len(rows) :]) for row in rows)
 
     def transpose(self, m: Any) -> Array:
         """Return a matrix, a list of rows, with its columns as rows."""
@@ -119,10 +132,10 @@ class ValueFunctions:
         return Array(bool(int(x) >> place & 1) for place in range(32))
 
     def make_list(self, length: int, initial_value: Any, capacity: int = 0) -> Array:
-        """Return a list of a value; the lists of this simulation do not grow."""
+        """Return a list of a value, which may grow to a capacity."""
         if not 0 <= int(length) <= MAX_ITEMS or int(capacity) > MAX_ITEMS:
             raise ScriptError(f"a list has at most {MAX_ITEMS} elements, got {show(length)} and {show(capacity)}")
-        return make_list(tuple([initial_value] * int(length)))
+        return make_list([initial_value] * int(length), max(int(length), int(capacity)))
 
     def log(self, b: float, n: float) -> float:
         """Return the logarithm of n to the base b."""
@@ -148,8 +161,8 @@ class ValueFunctions:
     def str_cat(self, op1: Any, op2: Any) -> str:
         """Return two values as one text."""
         text = text_of(op1) + text_of(op2)
-        if len(text) > _MAX_TEXT:
-            raise ScriptError(f"str_cat makes at most {_MAX_TEXT} characters, got {len(text)}")
+        if len(text) > MAX_LINE:
+            raise ScriptError(f"str_cat makes at most {MAX_LINE} characters, got {len(text)}")
         return text
 
     def str_empty(self, str: Any) -> bool:
@@ -189,7 +202,7 @@ for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "flo
     setattr(ValueFunctions, _name, staticmethod(getattr(math, _name)))
 
 
-_MAX_TEXT = 1023  # characters that str_cat and to_str make
+MAX_LINE = 1023  #: characters that str_cat and to_str make
 _NUMBER_TEXT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -199,20 +212,21 @@ def text_of(value: Any) -> str:
     Raises:
         ScriptError: it is no text, number, truth value, list or pose, or makes too long a text.
     """
-    text = _text_of(value)
-    if len(text) > _MAX_TEXT:
-        raise ScriptError(f"a text made of values has at most {_MAX_TEXT} characters, got {len(text)}")
+    text = written(value)
+    if len(text) > MAX_LINE:
+        raise ScriptError(f"a text made of values has at most {MAX_LINE} characters, got {len(text)}")
     return text
 
 
-def _text_of(value: Any) -> str:
+def written(value: Any) -> str:
+    """Return a value as text of any length."""
     if isinstance(value, float) and math.isfinite(value):
         return f"{value:.6f}".rstrip("0").removesuffix(".")
     if isinstance(value, str | int | float):
         return str(value)
     if isinstance(value, list):
-        return f"{'p' * isinstance(value, PoseValue)}[{', '.join(map(_text_of, value))}]"
-    raise ScriptError(f"a value of kind {type(value).__name__} is no text")
+        return f"{'p' * isinstance(value, PoseValue)}[{', '.join(map(written, value))}]"
+    return show(value)
 
 
 def _text(value: Any) -> str:

@@ -1,6 +1,7 @@
-"""Values of URScript and their arithmetic: numbers, texts, lists and poses p[x, y, z, rx, ry, rz].
+"""Values of URScript and their arithmetic: numbers, texts, lists, matrices, structs, poses p[x, y, z, rx, ry, rz].
 
-A pose's rotation is a rotation vector: the axis times the angle [rad] (Universal Robots calls it axis-angle).
+A pose's rotation is a rotation vector: the axis times the angle [rad] (Universal Robots calls it axis-angle). A matrix
+is a list of rows. No value ever changes: an assignment to an element makes a new list, so that no two variables share.
 
 Numbers are doubles and 32-bit integers, and no result grows without a bound. Python's integers and texts have no
 largest size: ``9 ^ 9 ^ 9``, or a text doubled a hundred times, would never end.
@@ -8,7 +9,7 @@ largest size: ``9 ^ 9 ^ 9``, or a text doubled a hundred times, would never end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from coneskin.geometry.pose import Pose, Vector
@@ -33,16 +34,26 @@ class ScriptError(Exception):
 
 
 class Array(list[Any]):
-    """URScript list."""
+    """URScript list.
+
+    Attributes:
+        capacity: greatest number of elements, where it is not the number that the list has.
+        size: number of values in it, and in all that it holds; 0 until it is asked for.
+        depth: of lists in lists, likewise.
+    """
+
+    capacity: int | None = None
+    size = depth = 0
 
 
 class PoseValue(Array):
     """URScript pose: position [m] and rotation vector [rad], six numbers."""
 
 
-def _copy(value: Any) -> Any:
-    """Return a copy of a list, or the value itself: URScript assigns lists by value."""
-    return type(value)(value) if isinstance(value, list) else value
+class Struct(dict[str, Any]):
+    """URScript struct: names of members -> values."""
+
+    size = depth = 0
 
 
 def numbers(values: Any, count: int, name: str) -> list[float]:
@@ -69,6 +80,8 @@ def number(value: Any, name: str) -> float:
 
 def show(value: Any) -> str:
     """Return a value as text for the log, shortened where it is long."""
+    if isinstance(value, Struct):
+        return f"struct({', '.join(f'{name}={show(item)}' for name, item in value.items())})"
     if isinstance(value, list):
         rest = ", ..." if len(value) > _MAX_ITEMS_SHOWN else ""
         shown = (repr(item)[:99] if isinstance(item, str) else show(item) for item in value[:_MAX_ITEMS_SHOWN])
@@ -96,41 +109,55 @@ def interpolate(start: Pose, shift: Vector, turn: Vector, share: float) -> Pose:
 
 
 MAX_ITEMS = 200  #: of a list
+_MAX_SIZE, _MAX_DEPTH = 20_000, 8  # values in a value, and lists or structs inside each other
 _MAX_TEXT = 10_000  # characters
 _MAX_INTEGER = 2**31
 
 
-def _add(a: Any, b: Any) -> Any:
-    """Return a sum of numbers, of texts, or of lists element by element."""
-    if isinstance(a, list):
-        return _each(_add, a, _same(a, b))
-    if isinstance(a, str) and isinstance(b, str) and len(a) + len(b) > _MAX_TEXT:
-        raise ScriptError(f"a text has at most {_MAX_TEXT} characters, got {len(a) + len(b)}")
-    return _bounded(a + b)
+def is_matrix(value: Any) -> bool:
+    """Return whether a value is a list of lists."""
+    return isinstance(value, list) and bool(value) and all(isinstance(row, list) for row in value)
 
 
-def _subtract(a: Any, b: Any) -> Any:
-    """Return a difference of numbers, or of lists element by element."""
-    return _each(_subtract, a, _same(a, b)) if isinstance(a, list) else _bounded(a - b)
+def _elementwise(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    """Return an operation of numbers as one of lists too: element by element, or with one number for all."""
+
+    def apply(a: Any, b: Any) -> Any:
+        if isinstance(a, list):
+            if not isinstance(b, list):
+                return type(a)([apply(x, b) for x in a])
+            if len(a) != len(b):
+                raise ScriptError(f"a list of {len(a)} needs another of the same length, got {show(b)}")
+            return type(a)(map(apply, a, b))
+        return type(b)([apply(a, y) for y in b]) if isinstance(b, list) else operation(a, b)
+
+    return apply
+
+
+def _plus(a: Any, b: Any) -> Any:
+    if isinstance(a, str) and isinstance(b, str):
+        if len(a) + len(b) > _MAX_TEXT:
+            raise ScriptError(f"a text has at most {_MAX_TEXT} characters, got {len(a) + len(b)}")
+        return a + b
+    return _bounded(_number(a) + _number(b))
+
+
+_add = _elementwise(_plus)
+_subtract = _elementwise(lambda a, b: _bounded(_number(a) - _number(b)))
+_divide = _elementwise(lambda a, b: _number(a) / _number(b))
+_modulo = _elementwise(lambda a, b: _number(a) % _number(b))
+_times = _elementwise(lambda a, b: _bounded(_number(a) * _number(b)))
 
 
 def _multiply(a: Any, b: Any) -> Any:
-    """Return a product of numbers, or of a list and a number."""
-    if isinstance(a, list):
-        return _each(_multiply, a, [_number(b)] * len(a))
-    if isinstance(b, list):
-        return _each(_multiply, b, [_number(a)] * len(b))
-    return _bounded(_number(a) * _number(b))
-
-
-def _divide(a: Any, b: Any) -> Any:
-    """Return a quotient of numbers, or of a list and a number."""
-    return _each(_divide, a, [_number(b)] * len(a)) if isinstance(a, list) else _number(a) / _number(b)
-
-
-def _modulo(a: Any, b: Any) -> Any:
-    """Return the rest of a division."""
-    return _number(a) % _number(b)
+    """Return a product: of matrices, of a matrix and a list as its column, or element by element."""
+    if not (is_matrix(a) and isinstance(b, list)):
+        return _times(a, b)
+    if any(len(row) != len(b) for row in a):
+        raise ScriptError(f"a matrix with rows of {len(a[0])} needs {len(a[0])} rows or elements, got {len(b)}")
+    if is_matrix(b):
+        return Array(Array(sum(map(_times, row, column)) for column in zip(*b, strict=True)) for row in a)
+    return Array(sum(map(_times, row, b)) for row in a)
 
 
 def _power(a: Any, b: Any) -> Any:
@@ -144,36 +171,133 @@ def _power(a: Any, b: Any) -> Any:
 
 def _negate(a: Any) -> Any:
     """Return a number, or a list, with the other sign."""
-    return type(a)(_negate(x) for x in a) if isinstance(a, list) else -_number(a)
+    return type(a)(map(_negate, a)) if isinstance(a, list) else -_number(a)
 
 
-def make_list(items: tuple[Any, ...]) -> Array:
-    """Return a list of values; lists in it are copied, and hold no lists themselves."""
-    for item in items:
-        if isinstance(item, list) and any(isinstance(inner, list) for inner in item):
-            raise ScriptError("a list may hold lists, and those no further ones")
-    return Array(map(_copy, items))
+def _measured(value: Any) -> tuple[int, int]:
+    """Return how many values a value holds, and how deep."""
+    if not isinstance(value, Array | Struct):
+        return 1, 0
+    if not value.size:
+        inner = [_measured(item) for item in (value.values() if isinstance(value, Struct) else value)]
+        value.size = 1 + sum(size for size, _ in inner)
+        value.depth = 1 + max((depth for _, depth in inner), default=0)
+        if value.size > _MAX_SIZE or value.depth > _MAX_DEPTH:
+            raise ScriptError(f"a value holds at most {_MAX_SIZE} values, and lists to a depth of {_MAX_DEPTH}")
+    return value.size, value.depth
 
 
-def _make_pose(items: tuple[Any, ...]) -> PoseValue:
-    return PoseValue(map(_number, items))
+def _held(value: Any) -> Any:
+    """Return a value that is not too large for a program."""
+    _measured(value)
+    return value
 
 
-def _set_element(values: Any, key: Any, value: Any) -> None:
-    """Set an element of a list of values, or of a list of lists."""
-    if isinstance(value, list) and (value is values or any(isinstance(inner, list) for inner in value)):
-        raise ScriptError("a list may hold lists, and those no further ones")
-    values[key] = _copy(value)
+def make_list(items: Iterable[Any], capacity: int | None = None) -> Array:
+    """Return a list of values.
+
+    Raises:
+        ScriptError: it is longer than its capacity, or holds too many values.
+    """
+    made = Array(items)
+    made.capacity = capacity
+    if len(made) > (MAX_ITEMS if capacity is None else capacity):
+        raise ScriptError(f"a list has at most {capacity or MAX_ITEMS} elements here, got {len(made)}")
+    return _held(made)  # type: ignore[no-any-return]
 
 
-def _each(operation: Callable[[Any, Any], Any], a: list[Any], b: Sequence[Any]) -> Any:
-    return type(a)(operation(x, y) for x, y in zip(a, b, strict=True))
+def _element(value: Any, *keys: Any) -> Any:
+    """Return an element of a list, of a matrix, or a member of a struct."""
+    for key in keys:
+        if isinstance(value, Struct) and key in value:
+            value = value[key]
+        else:
+            value = value[_index(value, key)]
+    return value
 
 
-def _same(values: Sequence[Any], other: Any) -> Sequence[Any]:
-    if not isinstance(other, list) or len(other) != len(values):
-        raise ScriptError(f"a list of {len(values)} needs another of the same length, got {show(other)}")
-    return other
+def _index(value: Any, key: Any) -> int:
+    if isinstance(key, str):
+        raise ScriptError(f"{show(value)} has no member {key}")
+    if not isinstance(value, list):
+        raise ScriptError(f"only a list has elements, got {show(value)}")
+    if not 0 <= (index := int(_number(key))) < len(value):
+        raise ScriptError(f"a list of {len(value)} has no element {show(key)}")
+    return index
+
+
+def _with_element(item: Any, keys: tuple[Any, ...], value: Any) -> Any:
+    """Return a value with another element or member; a struct may get a new one."""
+    if not keys:
+        return item
+    key, *rest = keys
+    made: Any
+    if isinstance(value, Struct) and isinstance(key, str):
+        made = Struct(value)
+        made[key] = _with_element(item, tuple(rest), value.get(key))
+        return _held(made)
+    index = _index(value, key)
+    made = _like(value, value)
+    made[index] = _with_element(item, tuple(rest), value[index])
+    return _held(made)
+
+
+def _like(value: Any, items: Iterable[Any]) -> Any:
+    made = type(value)(items)
+    made.capacity = value.capacity
+    return made
+
+
+def call_method(value: Any, name: str, arguments: tuple[Any, ...]) -> tuple[Any, Any]:
+    """Return a list, matrix or struct after one of its methods, and what the method returns.
+
+    Source: Universal Robots, "The URScript Programming Language" 5.15 and later, types list and matrix.
+
+    Raises:
+        ScriptError: there is no such method, or its arguments do not fit.
+    """
+    if name == "to_string" and not arguments:
+        return value, show(value)
+    if not isinstance(value, Array) or name not in _METHODS:
+        raise ScriptError(f"{show(value)} has no method {name}")
+    items, capacity = list(value), len(value) if value.capacity is None else value.capacity
+    try:
+        result = _METHODS[name](items, capacity, *arguments)
+    except TypeError as exc:
+        raise ScriptError(f"{name}: {exc}") from exc
+    if items == value and len(items) == len(value):
+        return value, result
+    if len(items) > capacity:
+        raise ScriptError(f"{name}: the list has a capacity of {capacity} elements; make_list gives it another")
+    made = _like(value, items)
+    made.capacity = capacity
+    return _held(made), result
+
+
+#: methods that change the list
+CHANGING_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove"))
+
+
+def _row_and_column_count(items: list[Any], _: int) -> Array:
+    return Array((len(items), len(items[0]) if is_matrix(items) else 1))
+
+
+#: method -> what it does with the elements and the capacity of a list
+_METHODS: dict[str, Callable[..., Any]] = {
+    "append": lambda items, _, value: items.append(value),
+    "capacity": lambda _, capacity: capacity,
+    "clear": lambda items, _: items.clear(),
+    "excess_capacity": lambda items, capacity: capacity - len(items),
+    "extend": lambda items, _, other: items.extend(other),
+    "get_column": lambda items, _, index: Array(_element(row, index) for row in items),
+    "get_row": lambda items, _, index: _element(Array(items), index),
+    "insert": lambda items, _, index, value: items.insert(_index([*items, None], index), value),
+    "length": lambda items, _: len(items),
+    "pop": lambda items, _: items.pop(_index(items, len(items) - 1)),
+    "remove": lambda items, _, index: items.__delitem__(_index(items, index)),
+    "shape": _row_and_column_count,
+    "slice": lambda items, _, begin, end: Array(items[_index([*items, None], begin) : _index([*items, None], end)]),
+}
 
 
 def _number(value: Any) -> Any:
@@ -187,6 +311,11 @@ def _bounded(value: Any) -> Any:
     return float(value) if isinstance(value, int) and not -_MAX_INTEGER <= value < _MAX_INTEGER else value
 
 
+def _assert_true(value: Any, problem: str = "assertion failed") -> None:
+    if not value:
+        raise ScriptError(problem)
+
+
 #: name in a translated program -> operation
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "_add": _add,
@@ -197,7 +326,9 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "_power": _power,
     "_negate": _negate,
     "_list": make_list,
-    "_pose": _make_pose,
-    "_set": _set_element,
-    "_copy": _copy,
+    "_pose": lambda items: PoseValue(map(_number, items)),
+    "_struct": lambda members: _held(Struct(members)),
+    "_at": _element,
+    "_with": _with_element,
+    "_assert": _assert_true,
 }

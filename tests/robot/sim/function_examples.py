@@ -5,29 +5,18 @@ An example is a program whose last line must be True. Many are those of "The URS
 
 from __future__ import annotations
 
+from coneskin.robot.sim.machine import io_functions
+from coneskin.robot.sim.urscript.values import PoseValue, show
+
 _Q = "[0.1, -1.4, 1.5, -1.7, -1.4, 0.2]"
 _LEVEL = "get_actual_tcp_pose()"
 
-#: functions that are accepted and change nothing that a program or a client could see
-NO_EFFECT = frozenset(
-    [
-        "end_force_mode",
-        "end_freedrive_mode",
-        "end_teach_mode",
-        "freedrive_mode_no_incorrect_payload_check",
-        "set_configurable_digital_input_action",
-        "set_gp_boolean_input_action",
-        "set_input_actions_to_default",
-        "set_safety_mode_transition_hardness",
-        "set_standard_digital_input_action",
-        "set_tool_communication",
-        "set_tool_digital_input_action",
-        "freedrive_mode",
-        "teach_mode",
-        "zero_ftsensor",
-        "force_mode",
-    ]
-)
+
+def _written(answer: object) -> str:
+    return "p[0, 0, 0, 0, 0, 0]" if isinstance(answer, PoseValue) else show(answer)
+
+
+NO_EFFECT = frozenset([*io_functions.NO_EFFECT, "force_mode"])  # a wanted force is told
 
 #: subject -> name of a function -> example
 EXAMPLES: dict[str, dict[str, str]] = {
@@ -182,8 +171,23 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "write_output_float_register": "write_output_float_register(0, 2)\nread_output_float_register(0) == 2",
         "write_output_integer_register": "write_output_integer_register(1, 2)\nread_output_integer_register(1) == 2",
     },
+    "not there: answered as by a device that is not connected, and told to the clients once": {
+        "modbus_add_signal": 'modbus_add_signal("192.168.1.9", 255, 0, 0, "in", True, 3)\n'
+        'modbus_get_signal_status("in") == [False, False, False]',
+        "modbus_add_rw_signal": 'modbus_add_rw_signal("192.168.1.9", 255, 5, 2, 15, 2, "a")\n'
+        'modbus_get_signal_status("a") == [0, 0]',
+        "modbus_get_signal_status": 'modbus_add_signal("192.168.1.9", 255, 0, 2, "in")\n'
+        'modbus_get_signal_status("in", False) == 0',
+        "modbus_get_error": 'modbus_get_error("in") == -0x20000',
+        **{
+            name: f"{name}(0) == {_written(answer)}"
+            for answer, names in io_functions._ABSENT_DEVICES[1:]
+            for name in names.split()
+        },
+    },
     "sockets": {
         # where no server listens; those that send and read have tests of their own
+        "rpc_factory": 'rpc_factory("xmlrpc", "http://127.0.0.1:1/RPC2").closeXMLRPCClientConnection() == None',
         "socket_close": "socket_close()\nTrue",
         "socket_get_var": 'socket_get_var("x") == 0',
         "socket_open": 'socket_open("127.0.0.1", 1) == False',
@@ -207,9 +211,12 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "str_len": 'str_len("Hello") == 5',
         "str_sub": 'str_cat(str_sub("0123456789abc", 5, 3), str_sub("abcde", 2, 50)) == "567cde"',
         "to_num": 'to_num("-3.5") + to_num("4") == 0.5',
-        "to_str": 'to_str(2 / 3) == "0.666667"',
+        "to_str": 'to_str(2.123456123456) == "2.123456" and to_str(p[1.0, 2.0, 3, 4, 5, 6]) == "p[1, 2, 3, 4, 5, 6]"',
     },
     "time and messages": {
+        "interpreter_mode": "thread t():\nend_interpreter()\nend\nrun t()\ninterpreter_mode()\nTrue",
+        "end_interpreter": "end_interpreter()\nTrue",
+        "clear_interpreter": "clear_interpreter()\nTrue",
         "popup": 'popup("here", title="Popup #1", blocking=False)\nTrue',
         "protective_stop": "not False or protective_stop()",  # it would not return: see test_safety_system.py
         "sleep": "sleep(0.01)\nTrue",
@@ -232,7 +239,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "integer_to_binary_list": "binary_list_to_integer(integer_to_binary_list(-7)) == -7",
         "interpolate_pose": "point_dist(interpolate_pose(p[0.2, 0.2, 0.4, 0, 0, 0], p[0.2, 0.2, 0.6, 0, 0, 0], 0.5), "
         "p[0.2, 0.2, 0.5, 0, 0, 0]) < 1e-9",
-        "inv": "pose_dist(pose_trans(inv(get_forward_kin()), get_forward_kin()), p[0, 0, 0, 0, 0, 0]) < 1e-9",
+        "inv": "pose_dist(pose_trans(inv(get_forward_kin()), get_forward_kin()), p[0, 0, 0, 0, 0, 0]) < 1e-9\n"
+        "inv([[0, 2], [1, 1]]) == [[-0.5, 1], [0.5, 0]]",
         "length": "length(p[1, 2, 3, 4, 5, 6]) == 6",
         "log": "log(2, 4) == 2",
         "make_list": "make_list(3, 1.5, 5) == [1.5, 1.5, 1.5]",

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.robot.sim.machine import program
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import _MAX_SECONDARY, Controller
 from coneskin.robot.sim.machine.states import PORTS, Options
@@ -150,8 +149,7 @@ class Watched:
 
 @pytest.mark.parametrize("kind", ["def", "sec"])
 @pytest.mark.parametrize("name", BOMBS)
-def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program, "_MAX_TURN_TIME", 0.02)
+def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str) -> None:
     watched = Watched()
     watched.run(f"{kind} bomb():\n {BOMBS[name]}\nend\n")
     watched.controller.stop_program("test")

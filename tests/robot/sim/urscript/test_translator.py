@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.machine.states import Options, ProgramFailed
 from coneskin.robot.sim.urscript.translator import Translation, complete_programs, translate
 from coneskin.robot.sim.urscript.values import ScriptError
+from tests.robot.sim.program_bench import Bench
 
 
 def compiled(text: str) -> Translation:
@@ -238,17 +241,19 @@ def test_a_value_may_stand_at_the_start_of_the_next_line() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("def main():\n  x = \n  y = 1\nend", "line 2"),
-        ("def main():\n  explode(3)\nend", "the controller has no function explode"),
-        ("def main():\n  if True\n    x = 1\n  end\nend", "line 2: expected ':' at the end"),
+        ("def main():\n  x = \n  y = 1\nend", "line 3: '=' is unexpected in 'y = 1'"),
+        ("def main():\n  explode(3)\nend", "line 2: the controller has no function explode in 'explode(3)'"),
+        ("def main():\n  if True\n    x = 1\n  end\nend", "line 2: expected ':', got the end of the line in 'if True'"),
         ("def main():\n  while True:\n    sync()\nend", "a block has no 'end'"),
         ("def main():\n  x = 3 $ 4\nend", "is not URScript"),
         ("def main():\n  x = (3\nend", "line 2"),
-        ("def main():\nend\nmovej([0,0,0,0,0,0])", "after the end"),
+        ("def main():\n  break\nend", "line 2: break stands outside of a loop"),
+        ("def main():\n  x = struct(1)\nend", "a member of a struct needs a name"),
+        ("def main():\n  switch 1:\n    x = 2\n  end\nend", "line 2: expected 'end', got the end of the line"),
     ],
 )
 def test_a_text_that_is_not_a_program_is_refused_with_its_line(text: str, words: str) -> None:
-    with pytest.raises(ScriptError, match=words.replace("(", r"\(")):
+    with pytest.raises(ScriptError, match=re.escape(words)):
         compiled(text)
 
 
@@ -258,11 +263,42 @@ def test_python_cannot_be_reached_from_a_program() -> None:
             compiled(program(line))
 
 
-def test_an_endless_loop_ends_the_program_not_the_simulator() -> None:
-    controller = started(program("while True:\n  x = 1\nend"))
-    for _ in range(3):
+def test_a_loop_without_sync_is_preempted_and_other_threads_go_on() -> None:
+    """As the manual's page "Thread scheduling" has it: such a thread is not allowed to run until the next frame."""
+    body = """
+      global count = 0
+      thread counter():
+        while True:
+          count = count + 1
+          write_output_integer_register(0, count)
+          sync()
+        end
+      end
+      def recursive(n):
+        if n == 0:
+          return 1
+        end
+        return recursive(n - 1) + recursive(n - 1)
+      end
+      thread busy():
+        recursive(50)
+      end
+      run counter()
+      run busy()
+      while True:
+        x = 1
+      end"""
+    controller = started(program(body))
+    for _ in range(5):
         controller.update()
-    assert controller.program is None
+    assert controller.program is not None
+    assert controller.output_ints[0] == 5
+
+
+def test_a_wait_of_less_than_a_cycle_is_one() -> None:
+    turn = "sleep(0.001)\n n = n + 1\n write_output_integer_register(0, n)"
+    body = f"n = 0\nwhile get_digital_in(0) == False:\n {turn}\nend"
+    assert ints(program(body), 5)[0] == 4
 
 
 def test_programs_are_cut_out_of_the_stream() -> None:
@@ -284,3 +320,66 @@ def test_a_variable_called_p_is_not_a_pose() -> None:
       end
       write_output_integer_register(0, first(p[4, 0, 0, 0, 0, 0]))"""
     assert ints(program(body))[0] == 5
+
+
+@pytest.mark.parametrize(
+    ("body", "wanted"),
+    [
+        ("global a = [1, 2]\ndef f():\n return a\nend\nb = f()\nb[0] = 9\nx = a[0]", 1),  # a returned list is a copy
+        ("a = [[1, 2], [3, 4]]\nrow = a[0]\nrow[1] = 9\nx = a[0, 1]", 2),
+        ("m = [[1, 2], [3, 4], [5, 6]]\nm[2, 1] = 20\nx = m[2, 1] + m[2][0]", 25),
+        ("m = [[1, 2], [3, 4]] * [10, 20]\nx = m[1]", 110),
+        ("x = 0\nif ! False:\n x = 1\nend", 1),
+        ("assert(1 < 2)\nx = 3", 3),
+        ("def f():\n return None\nend\nx = 0\nif f() == None:\n x = 4\nend", 4),
+        ("x = 0xfF + 0x1", 256),
+        ("x = 0\nswitch 2:\n case 1:\n  x = 1\n case 1 + 1:\n  x = 5\n default:\n  x = 7\nend", 5),
+        ("x = 0\nswitch (x):\n case 1:\n  x = 1\n default:\n  x = 6\nend", 6),
+        ("s = struct(a = 1, pose = p[1, 2, 3, 0, 0, 0])\nt = s\nt.a = 5\nt.pose[0] = 7\n"
+         "x = s.a + 10 * t.a + t.pose[0]", 58),
+        ("s = struct(list = make_list(0, 0, 5))\ns.list.append(4)\ns.list.append(5)\n"
+         "x = s.list.pop() + s.list.length()", 6),
+        ("global l = make_list(0, 0, 9)\ndef f():\n l.append(8)\nend\nf()\nx = l[0] + l.length()", 9),
+        ("def f(a):\n a[0] = 9\n return a[0]\nend\nb = [1]\nx = f(b) + b[0]", 10),
+        ("x = to_num(str_sub('12', 0, 1)) y = 2 x = x + y", 3),  # statements of one line
+        ("global l = [1, 2]\nthread t(a):\n sync()\n write_output_integer_register(0, a[0])\nend\n"
+         "h = run t(l)\nl[0] = 5\njoin h\nx = read_output_integer_register(0)", 1),
+    ],
+)  # fmt: skip
+def test_a_construct_of_the_language(body: str, wanted: int) -> None:
+    assert ints(program(f"{body}\nwrite_output_integer_register(0, x)"))[0] == wanted
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("x = 1\ny = 1 / 0", "line 3: ZeroDivisionError: division by zero in 'y = 1 / 0'"),
+        ("assert(1 > 2)", "line 2: assertion failed in 'assert(1 > 2)'"),
+        ("x = [1, 2]\nx[2] = 1", "line 3: a list of 2 has no element 2 in 'x[2] = 1'"),
+        ("x = [1][-1]", "line 2: a list of 1 has no element -1 in"),
+        ("def f():\n return nothing\nend\nx = f()", "line 3: the variable nothing has no value in 'return nothing'"),
+        ("x = struct(a = 1)\ny = x.b", "line 3: struct(a=1) has no member b in 'y = x.b'"),
+        ("movej([0, 0, 0, 0, 0])", "line 2: joint positions must be 6 numbers"),
+    ],
+)
+def test_a_program_that_fails_names_its_line(body: str, words: str) -> None:
+    bench = Bench(start_delay=0.0)
+    bench.send(program(body))
+    bench.step(2)
+    assert words in bench.events("abort")[0]["reason"]
+    (failed,) = [notice for notice in bench.controller.notices if isinstance(notice, ProgramFailed)]
+    assert words.startswith(f"line {failed.line}: {failed.text}"[: len(words)])
+
+
+def test_a_def_and_its_call_in_one_send_are_one_program() -> None:
+    text = "def helper():\n  return 7\nend\ndef prog():\n  write_output_integer_register(0, helper())\nend\nprog()\n"
+    programs, rest = complete_programs("stopj(2)\n" + text)
+    assert (len(programs), rest) == (2, "")
+    assert ints(programs[1])[0] == 7
+    assert complete_programs("sec s():\n  x = 1\nend\nf(1)\n")[0] == ["sec s():\n  x = 1\nend\n", "f(1)\n"]
+    assert complete_programs("if x: y = 1 end\nz = 1\n")[0] == ["if x: y = 1 end\n", "z = 1\n"]
+
+
+def test_a_text_of_functions_and_statements_is_a_program() -> None:
+    text = "def f(x):\n  return x + y\nend\nglobal y = 4\nwrite_output_integer_register(0, f(3))"
+    assert ints(text)[0] == 7
