@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError, SkinConnectionError, SkinError, SkinTimeout
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from coneskin.session.skin_client import SkinClient
     from coneskin.skin.detection.frame.reading import TouchReading
     from coneskin.skin.sensor import Sensor
+    from coneskin.skin.sources.source import Source
 
 _FRAME_TIMEOUT = 30.0  # s that frames may be late or missing: nothing is guarded, and a late place is as good
 _READY_TIMEOUT = 10.0  # s for every sensor to send a run of good frames
@@ -33,15 +33,14 @@ _POLL_PERIOD = 0.02  # s between two looks at what is not skin
 
 
 class SkinWatch:
-    """Readings of a scene's sensors, judged as the guard judges them but for their age; opened in a ``with``.
+    """Readings of a scene's sensors, judged as the guard judges them but for their age.
 
     Args:
-        scene: with a source.
-        port: of a virtual skin; empty for a real one.
+        scene: with the sensors.
+        source: of their bytes, open.
     """
 
-    def __init__(self, scene: Scene, port: str = "") -> None:
-        assert scene.source is not None
+    def __init__(self, scene: Scene, source: Source) -> None:
         limits = scene.monitoring_limits
         timing = TimingLimits(late=_FRAME_TIMEOUT, clock_drift=limits.clock_drift)
         settings = DetectorSettings(stuck_frames=limits.stuck_frames, self_test=False, timing=timing)
@@ -50,17 +49,10 @@ class SkinWatch:
         # wires that are exchanged contradict themselves too; their places name them first, and this has the last word
         self._judge = TouchStream(sensors, replace(settings, self_test=True))
         self._contradictions: dict[str, str] = {}
-        self._source = open_source(scene.source.kind, scene.source.settings, port)
+        self._source = source
         self._faults: list[str] = []
         self._frames = FrameDecoder()
         self._drawn: dict[tuple[int, int], tuple[int, float, float]] = {}
-
-    def __enter__(self) -> SkinWatch:
-        self._source.__enter__()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
-        self._source.close()
 
     def await_ready(self) -> None:
         """Wait until every sensor has sent a run of good untouched frames.
@@ -159,15 +151,30 @@ def check_touchable(scene: Scene, simulated: bool) -> None:
         raise SkinConnectionError(f"the skin of {scene.name} is virtual, and nobody can touch it: use --simulated")
 
 
-def start_skin(scene: Scene, stack: ExitStack) -> SkinClient:
-    """Start the process of a scene's virtual skin, without its script of touches; it ends with the stack."""
-    from coneskin.session.skin_client import SkinClient
+def open_skin(scene: Scene, stack: ExitStack, played_as: Scene | None) -> tuple[Source, SkinClient | None]:
+    """Open the source of a scene's skin; it is closed with the stack.
 
-    start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve()), "script": False}
-    client = SkinClient(start, [item.sensor for item in scene.sensors])
-    stack.callback(client.process.wait, 10.0)
-    stack.callback(client.channel.close)
-    return client
+    Args:
+        scene: with a source.
+        stack: that closes it.
+        played_as: scene whose virtual skin, without its script of touches, is to send the bytes, from a process that
+            ends with the stack; None for a real skin.
+
+    Returns:
+        the source, and the client that touches a virtual skin.
+    """
+    assert scene.source is not None
+    client, port = None, ""
+    if played_as is not None:
+        from coneskin.session.skin_client import SkinClient
+
+        folder = str(played_as.folder.resolve())
+        start = {"scene": played_as.text, "name": played_as.name, "folder": folder, "script": False}
+        client = SkinClient(start, [item.sensor for item in played_as.sensors])
+        stack.callback(client.process.wait, 10.0)
+        stack.callback(client.channel.close)
+        port = client.port()
+    return stack.enter_context(open_source(scene.source.kind, scene.source.settings, port)), client
 
 
 class TouchSession:
@@ -210,11 +217,8 @@ class TouchSession:
             SkinError: the skin has a fault, or cannot be read.
         """
         with ExitStack() as stack:
-            port = ""
-            if self.simulated:
-                self._client = start_skin(self._wired_as, stack)
-                port = self._client.port()
-            watch = stack.enter_context(SkinWatch(self.scene, port))
+            source, self._client = open_skin(self.scene, stack, self._wired_as if self.simulated else None)
+            watch = SkinWatch(self.scene, source)
             watch.await_ready()
             yield watch
 

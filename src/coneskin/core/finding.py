@@ -41,6 +41,12 @@ class Finding:
         return f"{line}\n{'':9}  -> {self.remedy}" if self.remedy else line
 
 
+def judged(item: str, verdict: Verdict | bool, value: str, rule: str, remedy: str) -> Finding:
+    """Return a finding, without the remedy where nothing is wrong; for the verdict, True is "ok" and False "bad"."""
+    word: Verdict = "ok" if verdict is True else "bad" if verdict is False else verdict
+    return Finding(item, word, value, rule, "" if word == "ok" else remedy)
+
+
 def exit_code(findings: Iterable[Finding]) -> int:
     """Return 1 where anything is bad, else 0."""
     return 1 if any(finding.verdict == "bad" for finding in findings) else 0

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from coneskin.commissioning.skin_watch import TouchSession
@@ -35,36 +34,29 @@ _MAX_MOTION = 0.02  # rad; the words for the marks are of one posture
 
 
 class _ArmWatch:
-    """States of one arm; opened in a ``with``.
+    """States of one arm.
 
     Args:
         arm: of the scene.
+        stack: that closes their reader.
 
     Attributes:
         q: joint positions at the beginning [rad].
     """
 
-    def __init__(self, arm: ArmScene) -> None:
+    def __init__(self, arm: ArmScene, stack: ExitStack) -> None:
         model = arm_model(arm.model)
         self._driver = load_driver(model.family)
         self._driver.check_model(model, arm.host)
-        self._reader = self._driver.state_reader(arm.host)
+        self._reader = stack.enter_context(self._driver.state_reader(arm.host))
         self._heard = 0.0
         self.q: Joints = (0.0,) * 6
-
-    def __enter__(self) -> _ArmWatch:
-        self._reader.__enter__()
         end = time.monotonic() + _START_TIMEOUT
         while not self._heard:
             if time.monotonic() > end:
-                self._reader.close()
                 raise RobotTimeout(f"the controller has sent no state within {_START_TIMEOUT:g} s")
             wait_readable([self._reader], 0.05)
             self._read()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, exc: BaseException | None, tb: TracebackType | None) -> None:
-        self._reader.close()
 
     def check(self) -> None:
         """Raise where the arm has moved, or is not measured any more.
@@ -178,7 +170,7 @@ class Commissioner:
             return None, lambda: None
         if self._q is not None or self._session.simulated:
             return self._q or _SIMULATED_Q, lambda: None
-        watch = stack.enter_context(_ArmWatch(self._scene.arm))
+        watch = _ArmWatch(self._scene.arm, stack)
         return watch.q, watch.check
 
 

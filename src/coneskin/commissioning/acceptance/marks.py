@@ -123,14 +123,14 @@ def _on_sheet(sensor: Sensor, step: float) -> list[Mark]:
 
 
 def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float) -> list[Mark]:
-    from coneskin.robot.arm.kinematics import link_pose
+    from coneskin.robot.arm.kinematics import link_poses
 
     assert placed.model is not None
-    cone = sensor.frustum
-    base_link = link_pose(placed.model, q, placed.link)
+    cone, poses = sensor.frustum, link_poses(placed.model, q)
+    base_link, joint = poses[placed.link], poses[max(placed.link - 1, 0)].translation  # at which the link begins
     ends = [base_link.apply(placed.frustum.centre(u)) for u in (0.0, cone.slant)]
     axis = scaled(added(ends[1], scaled(ends[0], -1.0)), 1.0 / math.dist(*ends))
-    from_end1 = _begins_at_end1(placed, q)
+    from_end1 = math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
     along = axis if from_end1 else scaled(axis, -1.0)  # from the joint nearer the base to the farther one
     twelve, reference = _twelve(along)
     right = cross(along, twelve)
@@ -187,17 +187,6 @@ def _azimuths(placed: SensorOnArm, u: float) -> Callable[[Vector], float]:
     return bent_azimuth
 
 
-def _begins_at_end1(placed: SensorOnArm, q: Sequence[float]) -> bool:
-    """Tell whether end 1 of a sensor is nearer the joint at which its link begins."""
-    from coneskin.robot.arm.kinematics import link_poses
-
-    assert placed.model is not None
-    poses = link_poses(placed.model, q)
-    joint = poses[max(placed.link - 1, 0)].translation
-    ends = [poses[placed.link].apply(placed.frustum.centre(u)) for u in (0.0, placed.frustum.frustum.slant)]
-    return math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
-
-
 def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
     """Return the distance of a place from the axis of the joint at which a tube begins, along the link [m]."""
     from coneskin.robot.arm.kinematics import dh_mesh
@@ -211,10 +200,10 @@ def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float
     places = _slant_places(sensor)
     if placed.link not in _TUBE_LINKS or sensor.frustum.slant < 20.0 * _DISTANCE_STEP:
         return places
-    slope = (_from_joint(placed, model, places[-1]) - _from_joint(placed, model, places[0])) / (places[-1] - places[0])
+    found = [_from_joint(placed, model, u) for u in places]
+    slope = (found[-1] - found[0]) / (places[-1] - places[0])
     if abs(slope) < 0.5:
         return places
-    found = [_from_joint(placed, model, u) for u in places]
     return [
         u + (_DISTANCE_STEP * round(distance / _DISTANCE_STEP) - distance) / slope
         for u, distance in zip(places, found, strict=True)

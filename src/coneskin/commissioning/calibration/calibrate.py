@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,20 +167,22 @@ class Calibrator:
             self._touch(TouchSequence(self.sensors, self._mark_error), watch, _VIRTUAL_DURATION)
             if self._forces:
                 self._touch(ForceSequence(self._pressed, self._forces), watch, _VIRTUAL_PRESS)
-        results = [self._result(item, found, by) for item, found in zip(self.sensors, ohms, strict=True)]
-        return [_judged(result, watch.contradiction(result.touches.sensor.name)) for result in results]
+        wrong = [watch.contradiction(item.sensor.name) for item in self.sensors]
+        return [self._result(*of_sensor, by) for of_sensor in zip(self.sensors, ohms, wrong, strict=True)]
 
     def _touch(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch, duration: float) -> None:
         self._session.carry_out(sequence, watch, duration)
         if sequence.incomplete:
             raise SkinError(sequence.incomplete)
 
-    def _result(self, item: SensorTouches, ohms: tuple[float, float], by: str) -> CalibrationResult:
+    def _result(self, item: SensorTouches, ohms: tuple[float, float], contradiction: str, by: str) -> CalibrationResult:
         sensor, valid = item.sensor, item.valid
         try:
             fit = fit_map(sensor, [item.touches[number] for number in valid], self._mark_error, ohms)
             presses = self._pressed[self.sensors.index(item)].presses
             forces = fit_forces(presses) if presses else None
+            if contradiction:  # the fit names other mistakes first
+                raise SkinError(f"{sensor.name} cannot be calibrated: {contradiction}")
         except SkinError as exc:
             return CalibrationResult(item, ohms, refusal=str(exc))
         used = dict(zip(valid, fit.used, strict=True))
@@ -231,11 +233,3 @@ def _marks(sensor: Sensor, count: int, file: Path | None) -> tuple[Mark, ...]:
     sheet = None if count or file is None else _find_design(file)
     printed = () if sheet is None else _printed_marks(sensor, sheet)
     return printed or calibration_marks(sensor, count or 9)
-
-
-def _judged(result: CalibrationResult, contradiction: str) -> CalibrationResult:
-    """Return a result, refused where the frames contradict themselves and no other mistake was named."""
-    if not contradiction or result.refusal:
-        return result
-    name = result.touches.sensor.name
-    return replace(result, fit=None, record=None, refusal=f"{name} cannot be calibrated: {contradiction}")

@@ -14,13 +14,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from coneskin.commissioning.skin_watch import start_skin
+from coneskin.commissioning.line.port_search import port_group
+from coneskin.commissioning.skin_watch import open_skin
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
 from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.suspicions import suspicions
-from coneskin.skin.sources.kinds import is_simulated, open_source
+from coneskin.skin.sources.kinds import is_simulated
 
 from .guided_touches import examine_touches, guided_touches
 from .hold_ups import begin_measurement, examine_hold_ups
@@ -86,13 +87,12 @@ class Doctor:
 
     def examine(self) -> None:
         """Examine everything that the scene names, and meanwhile the computer."""
-        with ExitStack() as stack:
-            measurement = None
-            if self._hold_up_time:
-                measurement = stack.enter_context(begin_measurement(self._hold_up_time))
+        if not self._hold_up_time:
             self._examine_scene()
-            if measurement is not None:
-                self.note(examine_hold_ups(measurement))
+            return
+        with begin_measurement(self._hold_up_time) as measurement:
+            self._examine_scene()
+            self.note(examine_hold_ups(measurement))
 
     def _examine_scene(self) -> None:
         self.note(*_packages(self.scene))
@@ -123,12 +123,8 @@ class Doctor:
             return
         self.note(*_port(source))
         with ExitStack() as stack:
-            port, client = "", None
             try:
-                if is_simulated(source.kind):
-                    client = start_skin(scene, stack)
-                    port = client.port()
-                opened = stack.enter_context(open_source(source.kind, source.settings, port))
+                opened, client = open_skin(scene, stack, scene if is_simulated(source.kind) else None)
             except ConeSkinError as exc:
                 self.note(Finding("skin, port", "bad", str(exc), "it can be opened"))
                 self.note(*(Finding(item, "not tried", "no port") for item in ("skin, frames", "skin, wires")))
@@ -190,9 +186,7 @@ class Doctor:
         if patch is not None:
             self.patches.append(patch)
         if finding.verdict == "ok":
-            self.note(
-                examine_touches(sensor, [frame for _, frame in untouched.frames], kept, 1.0 / untouched.numbers().rate)
-            )
+            self.note(examine_touches(sensor, untouched.frames, kept, 1.0 / untouched.numbers().rate))
         else:
             self.note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
 
@@ -218,18 +212,11 @@ def _port(source: SourceScene) -> Iterator[Finding]:
         there = ", ".join(map(str, find_ports())) or "none at all"
         yield Finding(item, "bad", f"there is no {name}; present: {there}", "", "plug it in, or correct source.port")
     elif not os.access(path, os.R_OK | os.W_OK):
-        group = _group(path)
+        group = port_group(path)
         remedy = f"sudo usermod -aG {group} $USER, then log in again; or the udev rule in packaging/"
         yield Finding(item, "bad", f"{name} may not be read and written", f"group {group}", remedy)
     else:
         yield Finding(item, "ok", f"{name} may be read and written")
-
-
-def _group(path: Path) -> str:
-    try:
-        return path.group()
-    except (KeyError, OSError, NotImplementedError):  # a number without a name; Windows has none
-        return "dialout"
 
 
 def _latency_timer(source: SourceScene, opened: Source) -> Finding:

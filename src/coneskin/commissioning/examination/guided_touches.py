@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.commissioning.touching import Held, Mark, Notice, Touching, TouchJudge
 from coneskin.core.errors import SkinTimeout
-from coneskin.core.finding import Finding, Verdict
+from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
@@ -178,11 +178,9 @@ def examine_touches(sensor: Sensor, untouched: Sequence[Frame], touched: Sequenc
     middle = statistics.median(found)
     verdict: Verdict = "ok" if middle <= _GOOD_PART else "warning" if middle <= 1.0 else "bad"
     remedy = (
-        ""
-        if verdict == "ok"
-        else "the gains of the inputs, the shunt or the pull-downs are not what the scene says: measure pulldown_ohm, "
+        "the gains of the inputs, the shunt or the pull-downs are not what the scene says: measure pulldown_ohm, "
         "current_full_scale_ma and input_ohm of the sensor"
     )
-    return Finding(
+    return judged(
         item, verdict, f"the median of {len(found)} touched frames is {middle:.2f} of the limit", rule, remedy
     )

@@ -6,7 +6,7 @@ import math
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.finding import Finding, Verdict
+from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
@@ -28,34 +28,34 @@ class SensorStatistics:
     """Frames of one sensor.
 
     Attributes:
-        frames: with the time at which each was read [s].
+        frames: the first of them.
+        times: at which each was read [s].
         status: bits that any of them carried.
     """
 
     def __init__(self) -> None:
-        self.frames: list[tuple[float, Frame]] = []
+        self.frames: list[Frame] = []
+        self.times: list[float] = []
         self.status = 0
 
     def add(self, time: float, frame: Frame) -> None:
         """Take a frame."""
         self.status |= frame.status
         if len(self.frames) < _MAX_FRAMES:
-            self.frames.append((time, frame))
+            self.frames.append(frame)
+            self.times.append(time)
 
     def numbers(self) -> FrameNumbers:
         """Measure how the frames follow each other."""
-        return measure_numbers([frame for _, frame in self.frames], [time for time, _ in self.frames])
+        return measure_numbers(self.frames, self.times)
 
     def mean(self, channel: str) -> float:
         """Return the mean of a reading [counts]."""
-        return statistics.fmean(self._values(channel))
+        return statistics.fmean(getattr(frame, channel) for frame in self.frames)
 
     def noise(self, channel: str) -> float:
         """Return the standard deviation of a reading [counts]."""
-        return statistics.pstdev(self._values(channel))
-
-    def _values(self, channel: str) -> list[int]:
-        return [getattr(frame, channel) for _, frame in self.frames]
+        return statistics.pstdev(getattr(frame, channel) for frame in self.frames)
 
 
 class SkinStatistics:
@@ -139,11 +139,9 @@ def examine_line(
         rate = sum(one for one in rates if math.isfinite(one))
         load = rate * FRAME_LENGTH * _BITS_PER_BYTE / baud
         value = f"{rate:.0f} frames/s take {100.0 * load:.0f} % of {baud} baud"
-        full = load > _LINE_LOAD
-        remedy = (
-            "raise `baud` in the scene and in the firmware; a USB device of its own has no such limit" if full else ""
-        )
-        found.append(Finding("line", "warning" if full else "ok", value, f"at most {100 * _LINE_LOAD:.0f} %", remedy))
+        remedy = "raise `baud` in the scene and in the firmware; a USB device of its own has no such limit"
+        rule = f"at most {100 * _LINE_LOAD:.0f} %"
+        found.append(judged("line", "warning" if load > _LINE_LOAD else "ok", value, rule, remedy))
     return found
 
 
@@ -172,20 +170,15 @@ def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> 
     rate = numbers.rate
     enough = rate >= _LOW_RATE or rate * silence >= _FRAMES_PER_SILENCE
     verdict: Verdict = "ok" if rate >= _GOOD_RATE else "warning" if enough else "bad"
-    remedy = "" if verdict == "ok" else "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
-    found = [Finding(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
-    verdict = "ok" if numbers.missing <= _MAX_LOST else "bad"
-    remedy = "" if verdict == "ok" else "the line is too slow or disturbed, or this computer too busy"
-    found.append(
-        Finding(f"{name}, lost", verdict, f"{100.0 * numbers.missing:.1f} % of the frames", "at most 2 %", remedy)
-    )
+    remedy = "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
+    found = [judged(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
+    remedy = "the line is too slow or disturbed, or this computer too busy"
+    value = f"{100.0 * numbers.missing:.1f} % of the frames"
+    found.append(judged(f"{name}, lost", numbers.missing <= _MAX_LOST, value, "at most 2 %", remedy))
     ratio = numbers.clock_ratio
-    verdict = "ok" if abs(ratio - 1.0) <= max(_CLOCK_ERROR, drift) else "bad"
-    remedy = (
-        "" if verdict == "ok" else "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
-    )
-    value = f"{ratio:.3f} device seconds in a second"
-    found.append(Finding(f"{name}, clock", verdict, value, "1 +- 0.01, as far as a few seconds show it", remedy))
+    remedy = "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
+    value, rule = f"{ratio:.3f} device seconds in a second", "1 +- 0.01, as far as a few seconds show it"
+    found.append(judged(f"{name}, clock", abs(ratio - 1.0) <= max(_CLOCK_ERROR, drift), value, rule, remedy))
     return found
 
 
@@ -194,17 +187,14 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     expected = parts.supply_volts / parts.adc_volts * parts.full_count
     supply = seen.mean("touch_supply")
     good = abs(supply - expected) <= _SUPPLY_ERROR * expected
-    remedy = "" if good else "correct supply_v, adc_v and adc_bits of the sensor, or the supply itself"
-    found = [
-        Finding(f"{name}, supply", "ok" if good else "bad", f"{supply:.0f} counts", f"{expected:.0f} +- 10 %", remedy)
-    ]
+    remedy = "correct supply_v, adc_v and adc_bits of the sensor, or the supply itself"
+    found = [judged(f"{name}, supply", good, f"{supply:.0f} counts", f"{expected:.0f} +- 10 %", remedy)]
     guides = [channel for channel in _CHANNELS if not channel.endswith(("current", "supply"))]
     worst = max(guides, key=seen.mean)
     part = seen.mean(worst) / max(supply, 1.0)
-    good = part <= _GUIDE_NOISE
-    remedy = "" if good else "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
+    remedy = "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
     value = f"at most {100.0 * part:.2f} % of the supply, on {worst}"
-    found.append(Finding(f"{name}, guides", "ok" if good else "bad", value, "untouched: at most 1 %", remedy))
+    found.append(judged(f"{name}, guides", part <= _GUIDE_NOISE, value, "untouched: at most 1 %", remedy))
     status = seen.status & _STATUS_FAULTS
     if status:
         names = ", ".join(bit.name or str(bit.value) for bit in Status if bit & status)
@@ -217,54 +207,31 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
 def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     name = sensor.name
     noise = {channel: seen.noise(channel) for channel in _CHANNELS}
-    still = [channel for channel in ("radial_current", "angular_current", "touch_supply") if noise[channel] == 0.0]
+    still = ", ".join(name for name in ("radial_current", "angular_current", "touch_supply") if noise[name] == 0.0)
     scale = sensor.electronics.full_count / 4095.0
-    loud = [channel for channel, value in noise.items() if value > _MAX_NOISE * scale]
+    loud = ", ".join(channel for channel, value in noise.items() if value > _MAX_NOISE * scale)
     value = ", ".join(f"{channel} {value:.1f}" for channel, value in noise.items())
-    verdict: Verdict = "bad" if still else "warning" if loud else "ok"
-    remedy = ""
+    remedy = f"{loud}: ground and shield the sensor, settle longer, average in the firmware"
     if still:
-        remedy = f"{', '.join(still)} never changed: a converter of more bits, or monitoring.stuck_frames = 0"
-    elif loud:
-        remedy = f"{', '.join(loud)}: ground and shield the sensor, settle longer, average in the firmware"
-    return [Finding(f"{name}, noise", verdict, f"counts rms: {value}", "each current and supply moves", remedy)]
+        remedy = f"{still} never changed: a converter of more bits, or monitoring.stuck_frames = 0"
+    verdict: Verdict = "bad" if still else "warning" if loud else "ok"
+    return [judged(f"{name}, noise", verdict, f"counts rms: {value}", "each current and supply moves", remedy)]
 
 
 def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     parts, found = sensor.electronics, []
     ampere = parts.current_full_scale / parts.full_count
-    for phase, design, wires, key, ohms, sheet, leads in (
-        (
-            "radial",
-            sensor.radial_amperes,
-            "A and B",
-            "upper_sheet_ohm",
-            sensor.radial_ohms,
-            sensor.upper_sheet_ohms,
-            (0, 1),
-        ),
-        (
-            "angular",
-            sensor.angular_amperes,
-            "C and D",
-            "lower_sheet_ohm",
-            sensor.angular_ohms,
-            sensor.lower_sheet_ohms,
-            (2, 3),
-        ),
+    for phase, wires, key, design, ohms, sheet in (
+        ("radial", "A and B", "upper_sheet_ohm", sensor.radial_amperes, sensor.radial_ohms, sensor.upper_sheet_ohms),
+        ("angular", "C and D", "lower_sheet_ohm", sensor.angular_amperes, sensor.angular_ohms, sensor.lower_sheet_ohms),
     ):
         measured = seen.mean(f"{phase}_current") * ampere
-        ratio = measured / design
-        verdict: Verdict = "ok" if 1.0 / _NEAR_FACTOR <= ratio <= _NEAR_FACTOR else "warning"
-        remedy = ""
-        if ratio < 1.0 / _FAR_FACTOR or ratio > _FAR_FACTOR:
-            verdict = "bad"
-        if ratio < 0.02:
-            remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
-        elif verdict != "ok":
-            lead = sum(parts.lead_ohms[number] for number in leads)
-            own = (parts.supply_volts / measured - lead) * sheet / ohms
+        off = max(measured / design, design / measured) if measured > 0.0 else math.inf
+        verdict: Verdict = "ok" if off <= _NEAR_FACTOR else "warning" if off <= _FAR_FACTOR else "bad"
+        remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
+        if measured >= 0.02 * design:
+            own = sheet * (1.0 + parts.supply_volts * (1.0 / measured - 1.0 / design) / ohms)  # the leads stay
             remedy = f"if nothing is broken your layer has {own:.0f} ohm per square: write {key} = {own:.0f}"
         value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR_FACTOR:g} times"
-        found.append(Finding(f"{sensor.name}, {phase} current", verdict, value, rule, remedy))
+        found.append(judged(f"{sensor.name}, {phase} current", verdict, value, rule, remedy))
     return found

@@ -75,8 +75,12 @@ def port_trouble(device: str) -> str:
         return ""
     if not Path(device).exists():
         return f"{device}: no such port"
+    return f"{device}: not permitted; run `sudo usermod -aG {port_group(Path(device))} $USER`, and log in again"
+
+
+def port_group(device: Path) -> str:
+    """Return the group whose members may use a port."""
     try:
-        group = Path(device).group()
-    except (OSError, KeyError):
-        group = "dialout"
-    return f"{device}: not permitted; run `sudo usermod -aG {group} $USER`, and log in again"
+        return device.group()
+    except (KeyError, OSError, NotImplementedError):  # a number without a name; Windows has none
+        return "dialout"
