@@ -44,11 +44,20 @@ class Capture:
         """Time since the newest piece [s]."""
         return self.now - (self.pieces[-1][0] if self.pieces else self.since)
 
-    def arrivals(self, offsets: Sequence[int]) -> list[float]:
+    def _arrivals(self, offsets: Sequence[int]) -> list[float]:
         """Return when the bytes at these offsets came [s]."""
         ends = list(accumulate(len(piece) for _, piece in self.pieces))
         last = len(ends) - 1
         return [self.pieces[min(bisect_right(ends, offset), last)][0] for offset in offsets]
+
+    def by_sensor(self, found: FoundFrames) -> dict[tuple[int, int], tuple[list[Frame], list[float]]]:
+        """Return the frames that were found in it, and when each came [s], by the numbers of device and sensor."""
+        rows: dict[tuple[int, int], tuple[list[Frame], list[float]]] = {}
+        for frame, time in zip(found.frames, self._arrivals(found.offsets), strict=True):
+            frames, times = rows.setdefault((frame.device, frame.sensor), ([], []))
+            frames.append(frame)
+            times.append(time)
+        return rows
 
 
 class CaptureWindow:

@@ -95,12 +95,7 @@ def _find_seven_bits(data: bytes) -> Finding | None:
 
 def _find_in_frames(capture: Capture, found: FoundFrames, sensors: Sequence[Sensor]) -> Finding:
     """Name what is wrong with valid frames, sensor by sensor."""
-    times = capture.arrivals(found.offsets)
-    by_sensor: dict[tuple[int, int], tuple[list[Frame], list[float]]] = {}
-    for frame, time in zip(found.frames, times, strict=True):
-        frames, at = by_sensor.setdefault((frame.device, frame.sensor), ([], []))
-        frames.append(frame)
-        at.append(time)
+    by_sensor = capture.by_sensor(found)
     known = {(sensor.device_id, sensor.sensor_id): sensor for sensor in sensors}
     good = []
     for key, (frames, at) in by_sensor.items():

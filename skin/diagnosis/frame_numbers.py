@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import linear_regression, median_high
 
 from coneskin.core.finding import Finding
 from coneskin.skin.wire import Frame
@@ -48,14 +49,18 @@ def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNum
         frames: of one sensor, in their order.
         times: when each came, host clock [s].
     """
-    steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
-    ticks = _clock_steps(frames)
+    steps, ticks = _sequence_steps(frames), _clock_steps(frames)
     seconds = times[-1] - times[0] if times else 0.0
     rate = (len(frames) - 1) / seconds if seconds > 0.0 else math.nan
     forward = [step for step in steps if 0 < step < 0x8000]
     missing = sum(step - 1 for step in forward) / max(1, sum(forward))
-    middle = sorted(ticks)[len(ticks) // 2] * 1e-6 if ticks else 0.0
+    middle = median_high(ticks) * 1e-6 if ticks else 0.0
     return FrameNumbers(rate, _slope(ticks, times) if seconds >= _MIN_TIME else math.nan, missing, middle)
+
+
+def _sequence_steps(frames: Sequence[Frame]) -> list[int]:
+    """Return the steps of the sequence, modulo 65536."""
+    return [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
 
 
 def _clock_steps(frames: Sequence[Frame]) -> list[int]:
@@ -70,10 +75,7 @@ def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
     and of the last third are equally quick.
     """
     clocks = list(itertools.accumulate(ticks, initial=0))
-    count = len(times)
-    mean_time, mean_clock = math.fsum(times) / count, math.fsum(clocks) / count
-    spread = math.fsum((time - mean_time) ** 2 for time in times)
-    slope = math.fsum((t - mean_time) * (c - mean_clock) for t, c in zip(times, clocks, strict=True)) / spread
+    count, slope = len(times), linear_regression(times, clocks).slope
     third = count // 3
     for _ in range(_LINE_TURNS if third else 0):
         if not slope > 0.0:
@@ -117,7 +119,7 @@ def _find_repeats(frames: Sequence[Frame]) -> Finding | None:
 
 
 def _find_sequence(frames: Sequence[Frame], sensors: int) -> Finding | None:
-    steps = [(b.sequence - a.sequence) & 0xFFFF for a, b in itertools.pairwise(frames)]
+    steps = _sequence_steps(frames)
     (step, count), *_ = Counter(steps).most_common(1)
     share = count / len(steps)
     if step == 0 and share >= _STEADY_SHARE:
@@ -185,8 +187,7 @@ def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) ->
     lag = [time - 1e-6 * clock for time, clock in zip(times, clocks, strict=True)]
     edges = [len(lag) * part // _TIME_PARTS for part in range(_TIME_PARTS + 1)]
     quickest = [min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges)]
-    speeds = sorted((lag[b] - lag[a]) / max(times[b] - times[a], 1e-6) for a, b in itertools.pairwise(quickest))
-    middle = speeds[len(speeds) // 2]
+    middle = median_high((lag[b] - lag[a]) / max(times[b] - times[a], 1e-6) for a, b in itertools.pairwise(quickest))
     return ratio if 0.5 < middle / (1.0 - ratio) < 2.0 else 1.0 - middle
 
 
@@ -196,8 +197,7 @@ def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNu
     if numbers.rate < _MIN_RATE:
         return Cause.RATE_LOW.found(f"a sensor sends only {numbers.rate:.1f} frames a second")
     groups = sorted({*times})
-    pauses = sorted(b - a for a, b in itertools.pairwise(groups))
-    pause = pauses[len(pauses) // 2] if pauses else 0.0
+    pause = median_high(b - a for a, b in itertools.pairwise(groups)) if len(groups) > 1 else 0.0
     if pause > max(_HELD_BACK, 3.0 * numbers.period) and len(frames) > 3 * len(groups):
         each = len(frames) / len(groups)
         return Cause.HELD_BACK.found(f"frames come {each:.0f} at a time, every {1e3 * pause:.0f} ms")

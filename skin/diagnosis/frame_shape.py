@@ -6,6 +6,7 @@ import itertools
 from binascii import crc_hqx
 from collections import Counter
 from collections.abc import Sequence
+from statistics import median_high
 
 from coneskin.core.finding import Finding
 from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
@@ -87,8 +88,8 @@ def find_padding(frames: Sequence[bytes]) -> Finding | None:
         return None
     stands = Counter(frame[10:12] for frame in whole).most_common(1)[0][1] >= 0.9 * len(whole)
     clocks = [int.from_bytes(frame[12:16], "little") for frame in whole]
-    steps = sorted((b - a) & 0xFFFFFFFF for a, b in itertools.pairwise(clocks))
-    middle = steps[len(steps) // 2]
+    steps = [(b - a) & 0xFFFFFFFF for a, b in itertools.pairwise(clocks)]
+    middle = median_high(steps)
     steady = sum(0.7 * middle <= step <= 1.3 * middle for step in steps) >= 0.7 * len(steps)
     if stands and steady and 0 < middle < 1 << 24:
         size = len(whole[0])  # of the struct, with two bytes more at its end

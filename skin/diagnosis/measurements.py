@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from math import gcd
+from statistics import median_high
 
 from coneskin.core.finding import Finding
 from coneskin.skin.sensor import Sensor
@@ -164,15 +165,11 @@ def _find_stuck(columns: _Columns) -> Finding | None:
     return None
 
 
-def _middle(column: Sequence[int]) -> float:
-    return float(sorted(column)[len(column) // 2])
-
-
 def _find_unexpected(columns: _Columns, sensor: Sensor) -> Finding | None:
     """Compare what does not depend on a touch with what the scene says: supply and drive currents."""
     parts, bounds = sensor.electronics, sensor.bounds
     expected = expected_counts(sensor)
-    middles = [_middle(column) for column in columns]
+    middles = [median_high(column) for column in columns]
     supply, wanted = middles[_SUPPLY_AT], expected[_SUPPLY_AT]
     said = f"the supply reads {supply:.0f} counts, the scene expects {wanted}"
     if not bounds.supply_low <= supply <= bounds.supply_high:
@@ -212,7 +209,7 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
     columns, expected = list(zip(*map(_measured, frames), strict=True)), expected_counts(sensor)
     found = []
     for name, k in (("radial", _RADIAL_AT), ("angular", _ANGULAR_AT)):
-        off = _middle(columns[k]) / max(expected[k], 1) - 1.0
+        off = median_high(columns[k]) / max(expected[k], 1) - 1.0
         if abs(off) > _REMARKABLE_SHARE:
             found.append(f"{name} current {100.0 * off:+.0f} % of the design's: see coneskin doctor")
     hum = _measure_hum(columns)
@@ -236,7 +233,7 @@ def _measure_hum(columns: _Columns) -> float:
 
 def _find_floating(columns: _Columns) -> Finding | None:
     """Find guides that wander although nothing touches the sensor."""
-    supply = _middle(columns[_SUPPLY_AT])
+    supply = median_high(columns[_SUPPLY_AT])
     untouched = [c + d < _UNTOUCHED_SHARE * supply for c, d in zip(columns[0], columns[1], strict=True)]
     if sum(untouched) < _MIN_FRAMES:
         return None

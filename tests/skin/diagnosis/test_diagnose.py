@@ -78,7 +78,7 @@ def test_a_line_of_two_seconds_is_not_kept_for_ever() -> None:
 
 def test_a_capture_knows_when_each_byte_came() -> None:
     capture = Capture(((1.0, b"abc"), (2.0, b"d"), (4.0, b"ef")), 5.0)
-    assert capture.arrivals([0, 2, 3, 4, 5]) == [1.0, 1.0, 2.0, 4.0, 4.0]
+    assert capture._arrivals([0, 2, 3, 4, 5]) == [1.0, 1.0, 2.0, 4.0, 4.0]
     assert (capture.duration, capture.silence) == (4.0, 1.0)
 
 

@@ -141,13 +141,7 @@ class LineMonitor:
         """Return what has arrived until a host time [s]."""
         capture = self._window.capture(now, self._timed)
         data = capture.data
-        found = find_frames(data)
-        times = capture.arrivals(found.offsets)
-        rows: dict[tuple[int, int], tuple[list[Frame], list[float]]] = {}
-        for frame, time in zip(found.frames, times, strict=True):
-            frames, at = rows.setdefault((frame.device, frame.sensor), ([], []))
-            frames.append(frame)
-            at.append(time)
+        rows = capture.by_sensor(find_frames(data))
         sensors = [
             self._sensor_report(heard, measure_numbers(*rows.get(key, ([heard.newest], [now]))))
             for key, heard in sorted(self._heard.items())
@@ -322,27 +316,24 @@ def _cell(sensor: _SensorReport, name: str, color: bool) -> str:
     return (f"{_MARK_CODE}{text}{_UNMARK_CODE}" if color and name in sensor.changed else text) + wanted + padding
 
 
-def draw_sheet(place: tuple[float, float] | None, certain: bool, width: int, height: int = 7) -> list[str]:
+_SHEET_HEIGHT = 7  # lines of the drawing
+
+
+def draw_sheet(place: tuple[float, float] | None, certain: bool, width: int) -> list[str]:
     """Draw the unrolled sheet: end 1 (B) above, end 2 (A) below, D at the left edge and C at the right.
 
     Args:
         place: parts of the length from end 1 and of the wrap from D, 0 to 1; None for no touch.
         certain: whether the place is certain: it is drawn as O, else as a question mark.
         width: of the drawing [characters].
-        height: of it [lines].
     """
-    rows = [["."] * width for _ in range(height)]
+    rows = [["."] * width for _ in range(_SHEET_HEIGHT)]
     if place is not None:
-        row, column = round(place[0] * (height - 1)), round(place[1] * (width - 1))
+        row, column = round(place[0] * (_SHEET_HEIGHT - 1)), round(place[1] * (width - 1))
         rows[row][column] = "O" if certain else "?"
-    label = "D" + " " * (width - 2) + "C"
-    above, below = " B ", " A "
-    return [
-        f"   +{above.center(width, '-')}+",
-        *(f" {label[0] if k == height // 2 else ' '} |{''.join(row)}| {label[-1] if k == height // 2 else ''}".rstrip()
-          for k, row in enumerate(rows)),
-        f"   +{below.center(width, '-')}+",
-    ]  # fmt: skip
+    lines = [f"   |{''.join(row)}|" for row in rows]
+    lines[_SHEET_HEIGHT // 2] = f" D |{''.join(rows[_SHEET_HEIGHT // 2])}| C"
+    return [f"   +{' B '.center(width, '-')}+", *lines, f"   +{' A '.center(width, '-')}+"]
 
 
 def _rows(cells: list[str], count: int = 20) -> list[str]:
