@@ -13,7 +13,7 @@ import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,7 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import SheetTolerance
 
 from .circuit import ContactModel, LayerContact, Matrix
-from .field_contacts import FieldContacts
-from .ladder import ResistorLadder
+from .skin import contact_model
 
 _CELL_COUNT = 48  # of the mesh, along each side
 _BOND_SIEMENS = 200.0  # S for a whole electrode; silver on a film has milliohms
@@ -153,17 +152,18 @@ class _Sheet:
         self.answer: Floats = np.zeros((whole, 2))
         inside = free[free < whole]
         self.answer[inside] = answer[: inside.size]
-        self._size, self._columns = free.size, dict[int, Floats]()
+        self._size = free.size
+        self._column = cache(self._solve_column)
+
+    def _solve_column(self, node: int) -> Floats:
+        right = np.zeros(self._size)
+        right[node] = 1.0  # the nodes of the sheet come first, and no end is among them
+        return np.asarray(self._solver.solve(right))
 
     def coupling(self, points: Sequence[tuple[Any, Any]]) -> Floats:
         """Return the potentials [ohm] that a current into each point makes at each, both electrodes at ground."""
         nodes = sorted({int(k) for index, _ in points for k in index})
-        for k in nodes:
-            if k not in self._columns:
-                right = np.zeros(self._size)
-                right[k] = 1.0  # the nodes of the sheet come first, and no end is among them
-                self._columns[k] = self._solver.solve(right)
-        between = np.array([[self._columns[k][m] for m in nodes] for k in nodes])
+        between = np.array([self._column(k)[nodes] for k in nodes])
         weights = np.zeros((len(points), len(nodes)))
         for row, (index, share) in enumerate(points):
             weights[row, np.searchsorted(nodes, index)] += share
@@ -195,24 +195,19 @@ class _Pair:
         self.bare: Floats = np.zeros((4, 4))
         self.bare[np.ix_((1, 0), (1, 0))] = self._upper.own
         self.bare[np.ix_((3, 2), (3, 2))] = self._lower.own
-        self._kept: dict[tuple[tuple[float, float, float], ...], tuple[Floats, Floats]] = {}
+        self._prepared = lru_cache(maxsize=_CACHE_SIZE)(self._prepare)
 
     def admittance(self, contacts: Sequence[LayerContact]) -> Floats:
         """Return Y of A, B, C, D [S]."""
         contacts = [c for c in contacts if c.conductance > 0.0]
         if not contacts:
             return self.bare
-        key = tuple((c.u, c.phi, round(c.radius, 3)) for c in contacts)
-        if key not in self._kept:
-            if len(self._kept) >= _CACHE_SIZE:
-                self._kept.clear()
-            self._kept[key] = self._prepare(key)
-        between, force = self._kept[key]
+        between, force = self._prepared(tuple((c.u, c.phi, round(c.radius, 3)) for c in contacts))
         count = sum(number for _, number in _RING_POINTS)
         ohms = np.repeat([count / c.conductance for c in contacts], count)
         return np.asarray(self.bare + force.T @ np.linalg.solve(np.diag(ohms) + between, force))
 
-    def _prepare(self, places: Sequence[tuple[float, float, float]]) -> tuple[Floats, Floats]:
+    def _prepare(self, places: tuple[tuple[float, float, float], ...]) -> tuple[Floats, Floats]:
         """Return the coupling of all points [ohm], and the differences that the electrodes impose there."""
         uppers, lowers = [], []
         for u, phi, radius in places:
@@ -281,5 +276,4 @@ def build_specimen(
         parts = sensor.electronics
         leads = LeadOhms(*(ohms + abs(rng.gauss(0.0, tolerance.lead)) for ohms in parts.lead_ohms))
         built.append(replace(sensor, electronics=replace(parts, lead_ohms=leads)))
-    exact: ContactModel = FieldContacts() if model == "field" else ResistorLadder()
-    return built, BuiltSheets(draw_flaws(tolerance, seed), exact)
+    return built, BuiltSheets(draw_flaws(tolerance, seed), contact_model(model))

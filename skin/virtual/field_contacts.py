@@ -9,9 +9,9 @@ to the largest is therefore one matrix, scaled; only the discs' own answer D cha
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -68,11 +68,11 @@ class _FixedDiscs:
         us, phis, radii = (np.array([v], dtype=np.float64) for v in np.broadcast_arrays(u, phi, largest))
         discs = Discs(us, phis, radii, np.full_like(radii, math.inf))
         sheet, upper, lower = model.sheet, model.upper_resistance, model.lower_resistance
-        check_discs(sheet, discs.u, discs.phi, discs.radius, discs.conductance)
+        check_discs(sheet, discs)
         k = discs.u.shape[1]
         order = int(resolution(sheet, discs, model.contrast, model.tolerance)[0])
         coupling, moments = solve_to_tolerance(sheet, upper, lower, discs, order, model.tolerance)
-        order = moments.order
+        order = moments.shape[2] // 2
         strip = Strip.of(sheet.length, sheet.breadth)
         a, b = (lower, upper) if strip.along_x else (upper, lower)
         circles = make_circles(sheet, strip, discs, order, 2 * order + 2, with_images=a != b)
@@ -129,6 +129,8 @@ class _FixedDiscs:
 
 _CACHE_SIZE = 64  # sets of places; one for each combination of touches
 _MAX_REACH = 0.95  # part of the way to an edge that a disc may take
+_POINT_RADIUS = 1e-3  # m; of a contact that has none of its own
+_FIELD_TOLERANCE = 1e-7  # of the supply, of the potentials; a count of 16 bits is 1.5e-5
 _Key = tuple[tuple[float, float, float], ...]
 
 
@@ -138,21 +140,10 @@ class FieldContacts:
     What cannot be a disc inside the sheet is replaced by one that can: of a contact across an edge, the disc about the
     centroid of the part that is on the sheet, with that part's conductance; of contacts that overlap at their firmest,
     one about their common middle where they overlap by more than half, otherwise smaller ones of the same conductance.
-
-    Args:
-        point_radius: of a contact that has none of its own [m].
-        tolerance: of the potentials, relative to the supply; a count of 16 bits is 1.5e-5.
-
-    Raises:
-        FieldError: point_radius is not positive.
     """
 
-    def __init__(self, point_radius: float = 1e-3, tolerance: float = 1e-7) -> None:
-        if not (math.isfinite(point_radius) and point_radius > 0.0):
-            raise FieldError(f"point_radius must be positive and finite [m], got {point_radius!r}")
-        self.point_radius = point_radius
-        self.tolerance = tolerance
-        self._settings: OrderedDict[tuple[Sensor, _Key], _Setting] = OrderedDict()
+    def __init__(self) -> None:
+        self._setting = lru_cache(maxsize=_CACHE_SIZE)(_Setting.of)
 
     def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
         """Return for each scene the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
@@ -188,19 +179,8 @@ class FieldContacts:
             )
         if not 0.0 <= contact.conductance < math.inf:
             raise FieldError(f"conductance of a contact must be 0 or more and finite [S], got {contact.conductance!r}")
-        radius = contact.radius or self.point_radius
+        radius = contact.radius or _POINT_RADIUS
         return contact._replace(radius=radius, reach=max(contact.reach, radius))
-
-    def _setting(self, sensor: Sensor, key: _Key) -> _Setting:
-        known = self._settings.get((sensor, key))
-        if known is None:
-            known = _Setting.of(sensor, key, self.tolerance)
-            self._settings[sensor, key] = known
-            if len(self._settings) > _CACHE_SIZE:
-                self._settings.popitem(last=False)
-        else:
-            self._settings.move_to_end((sensor, key))
-        return known
 
 
 class _Spot(NamedTuple):
@@ -221,9 +201,9 @@ class _Setting(NamedTuple):
     reaches: tuple[float, ...]  #: what the spots' radii are at the contacts' firmest, before any is made smaller
 
     @classmethod
-    def of(cls, sensor: Sensor, key: _Key, tolerance: float) -> _Setting:
+    def of(cls, sensor: Sensor, key: _Key) -> _Setting:
         sheet = SectorSheet.of_frustum(sensor.frustum)
-        model = FieldModel(sheet, sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, tolerance)
+        model = FieldModel(sheet, sensor.upper_sheet_ohms, sensor.lower_sheet_ohms, _FIELD_TOLERANCE)
         spots = _merged(sheet, [_clipped(sheet, sensor, *one, n) for n, one in enumerate(key)])
         limits = _limits(sheet, spots)
         u, phi = [spot.u for spot in spots], [spot.phi for spot in spots]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import random
+from functools import lru_cache
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
@@ -37,7 +38,7 @@ class PlaceFrames:
     def __init__(self, sensor: Sensor, seed: int = 0) -> None:
         self._sensor = sensor
         self._noise = random.Random(f"places {seed}")
-        self._readings: dict[tuple[float, float, float], ConverterInputs] = {}
+        self._read = lru_cache(maxsize=_CACHE_SIZE)(self._measure)
         self._started = False
         self.sequence = 0
 
@@ -74,16 +75,10 @@ class PlaceFrames:
         self.sequence = (self.sequence + 1) & 0xFFFF
         return encode(frame._replace(driven=None))
 
-    def _read(self, level: float, u: float, phi: float) -> ConverterInputs:
-        key = (level, u, phi)
-        known = self._readings.get(key)
-        if known is None:
-            contacts = [LayerContact(u, phi, self._siemens(level, u, phi))] if level > 0.0 else []
-            sheets = ResistorLadder().admittance(self._sensor, contacts)
-            if len(self._readings) >= _CACHE_SIZE:
-                self._readings.clear()
-            known = self._readings[key] = measure(self._sensor, [sheets] * 3)
-        return known
+    def _measure(self, level: float, u: float, phi: float) -> ConverterInputs:
+        contacts = [LayerContact(u, phi, self._siemens(level, u, phi))] if level > 0.0 else []
+        sheets = ResistorLadder().admittance(self._sensor, contacts)
+        return measure(self._sensor, [sheets] * 3)
 
     def _siemens(self, level: float, u: float, phi: float) -> float:
         """Return the conductance of a contact that reads with this level: both sheets are in series with it [S]."""

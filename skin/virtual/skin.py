@@ -88,7 +88,7 @@ class VirtualSkin:
         self.seed = seed
         self.imperfections = imperfections or Imperfections()
         self.faults = faults or FaultInjection()
-        sheets = _model(model) if isinstance(model, str) else model
+        sheets = contact_model(model) if isinstance(model, str) else model
         self.model = sheets if wires == RIGHT_WIRES else RewiredSheets(sheets, wires)
         self.duration = duration
         self.frame_length = frame_length
@@ -262,7 +262,12 @@ def _channels(frame_length: int) -> tuple[str, ...]:
     return names if frame_length == FRAME_LENGTHS[-1] else names[: -len(DrivenPotentials._fields)]
 
 
-def _model(name: str) -> ContactModel:
+def contact_model(name: str) -> ContactModel:
+    """Return the model of a name of ``MODELS``.
+
+    Raises:
+        SensorError: there is no such model.
+    """
     if name == "field":
         from .field_contacts import FieldContacts
 

@@ -185,7 +185,7 @@ def test_a_free_body_that_is_pushed_along_has_no_force_at_rest() -> None:
 
 @pytest.mark.parametrize(("part", "mode"), [(0.5, taylor_integrator._SOFT), (1.5, taylor_integrator._HARD)])
 def test_a_padding_that_follows_again_is_bottomed_out_only_beyond_its_thickness(part: float, mode: int) -> None:
-    run = taylor_integrator._Integration(model(padding=Padding()), 1.0, True, math.inf)
+    run = taylor_integrator._Integration(model(padding=Padding()), 1.0, True, math.inf, 1e-6)
     run.mode, run.s = taylor_integrator._RELEASED, part * run.law.end
     run._switch("follow")
     assert run.mode == mode

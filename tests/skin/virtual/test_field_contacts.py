@@ -138,7 +138,6 @@ def test_the_model_agrees_with_ohm_without_contact() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: FieldContacts(point_radius=0.0), "point_radius must be positive"),
         (
             lambda: FieldContacts().admittances(Sensor(LINK), [[LayerContact(0.1, 3.0, -1.0)]])[0],
             "must be 0 or more and finite",

@@ -184,16 +184,8 @@ class ContactCourse:
 
     def force(self, time: float) -> float:
         """Return the force at a time [N]; 0 outside of the course."""
-        return self._value(time, "force")
-
-    def compression(self, time: float) -> float:
-        """Return the compression at a time [m]."""
-        return self._value(time, "compression")
-
-    def _value(self, time: float, name: str) -> float:
         if not 0.0 <= time <= self.end or not self.stretches:
             return 0.0
-        index = bisect_right([stretch.start for stretch in self.stretches], time) - 1
-        stretch = self.stretches[index]
-        value = evaluate(getattr(stretch, name), time - stretch.start)
+        stretch = self.stretches[bisect_right(self.stretches, time, key=lambda one: one.start) - 1]
+        value = evaluate(stretch.force, time - stretch.start)
         return value if math.isfinite(value) else 0.0

@@ -32,11 +32,8 @@ def draw_map(scene: Scene, limits: LimitsFile, found: SpeedMap, path: Path) -> N
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-
-    def refusal(why: str) -> SceneError:
-        return SceneError([why], path.name)
-
-    write_picture(path, "the picture of the speeds", lambda: _compose(scene, limits, found), refusal)
+    draw, refuse = lambda: _compose(scene, limits, found), lambda why: SceneError([why], path.name)
+    write_picture(path, "the picture of the speeds", draw, refuse)
 
 
 def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:

@@ -14,7 +14,7 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,9 +48,8 @@ _SPEED_TOLERANCE = 4e-3  # of the speed that is found
 
 def _keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
     """Tell whether a contact keeps limits."""
-    distance = _stopping_distance(model)
-    if model.static(distance)[0] > limits.lasting:
-        return False  # known without a look at the course
+    if model.static(model.arm.stopping_way)[0] > limits.lasting:
+        return False  # known without a look at the course: the time to the closing makes it no better
     course = integrate(model, keep=False, stop_above=limits.transient)
     return course.peak <= limits.transient and max(course.last, course.rest) <= limits.lasting
 
@@ -89,14 +88,6 @@ def permissible_speed(
         else:
             high = middle
     return low
-
-
-def _stopping_distance(model: TwoMassContact) -> float:
-    """Return a lower bound of the way that the arm is driven into the body [m]: without the time to the closing."""
-    arm = model.arm
-    if math.isinf(arm.reaction):
-        return 0.0
-    return arm.speed * arm.reaction + arm.speed**2 / (2.0 * arm.deceleration)
 
 
 #: m/rad; a UR20 reaches 1.75 m
@@ -272,50 +263,44 @@ class _CurveMaker:
     def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
         self.curves: list[_SpeedCurve] = []
         self._limits, self._padding, self._note = limits, padding, note
-        self._numbers: dict[tuple[tuple[BodyRegion, ...], tuple[float, ...], ExtraWay], int] = {}
-        # two regions may have one name
-        self._speeds: dict[tuple[BodyRegion, float, ExtraWay], tuple[float, ...]] = {}
+        self._number, self._search = cache(self._new_number), cache(self._new_search)
 
     def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay) -> int:
         """Return the number of the curve of a link, for a range of masses [kg] and an extra way."""
         regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
         first = max((n for n, mass in enumerate(_CURVE_MASSES) if mass <= lightest), default=0)
         last = min(n for n, mass in enumerate(_CURVE_MASSES) if mass >= heaviest)
-        masses = _CURVE_MASSES[first : last + 1]
-        key = regions, masses, extra
-        if key not in self._numbers:
-            least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
-            speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
-            curve = _SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
-            if curve not in self.curves:
-                self.curves.append(curve)
-            self._numbers[key] = self.curves.index(curve)
-        return self._numbers[key]
+        return self._number(regions, _CURVE_MASSES[first : last + 1], extra)
 
-    def _search(self, region: BodyRegion, mass: float, extra: ExtraWay) -> tuple[float, ...]:
+    def _new_number(self, regions: tuple[BodyRegion, ...], masses: tuple[float, ...], extra: ExtraWay) -> int:
+        least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
+        speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
+        curve = _SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
+        if curve not in self.curves:
+            self.curves.append(curve)
+        return self.curves.index(curve)
+
+    def _new_search(self, region: BodyRegion, mass: float, extra: ExtraWay) -> tuple[float, ...]:
         """Return the permissible speeds of one mass against one region, for each lever."""
-        key = region, mass, extra
-        if key not in self._speeds:
-            self._note(f"{region.name} struck by {mass:g} kg")
-            speeds: list[float] = []
-            for number, lever in enumerate(LEVERS):
+        self._note(f"{region.name} struck by {mass:g} kg")
+        speeds: list[float] = []
+        for number, lever in enumerate(LEVERS):
 
-                def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
-                    common = region, self._limits.measured, self._padding
-                    return [contact_at(speed, lever, mass, *common, way) for way in ways]
+            def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
+                common = region, self._limits.measured, self._padding
+                return [contact_at(speed, lever, mass, *common, way) for way in ways]
 
-                least, top = _LEAST_SPEED, _TOP_SPEED
-                if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
-                    least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
-                found = permissible_speed(contacts, region.limits, least, top)
-                both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
-                if found > 0.0 and not all(_keeps(contact, region.limits) for contact in both(found)):
-                    found = permissible_speed(both, region.limits, least, top)
-                speeds.append(found)
-            for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
-                speeds[number] = min(speeds[number], speeds[number + 1])
-            self._speeds[key] = tuple(speeds)
-        return self._speeds[key]
+            least, top = _LEAST_SPEED, _TOP_SPEED
+            if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
+                least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
+            found = permissible_speed(contacts, region.limits, least, top)
+            both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
+            if found > 0.0 and not all(_keeps(contact, region.limits) for contact in both(found)):
+                found = permissible_speed(both, region.limits, least, top)
+            speeds.append(found)
+        for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
+            speeds[number] = min(speeds[number], speeds[number + 1])
+        return tuple(speeds)
 
 
 def _check(scene: Scene, limits: LimitsFile) -> None:

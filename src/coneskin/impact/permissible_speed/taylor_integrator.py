@@ -225,9 +225,7 @@ def integrate(
 class _Integration:
     """State of one integration."""
 
-    def __init__(
-        self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float, tolerance: float = 1e-6
-    ) -> None:
+    def __init__(self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float, tolerance: float) -> None:
         self.model, self.horizon, self.keep, self.stop_above = model, horizon, keep, stop_above
         self.tolerance, self.max_tail = tolerance, max(tolerance, _MIN_TAIL)
         self.faded_exponent = min(-math.log(tolerance), _FADED_EXPONENT)
@@ -416,14 +414,13 @@ class _Integration:
     def _outcome(self) -> ContactCourse:
         arm = self.model.arm
         distance = math.inf if arm.speed > 0.0 else 0.0
-        braking = arm.speed * arm.reaction + arm.speed**2 / (2.0 * arm.deceleration)
         if self.drive == 0.0:
             distance = self.way
         elif math.isfinite(self.braked):
             before = max(0.0, self.braked - self.time) * self.drive
             distance = self.way + before + self.drive**2 / (2.0 * arm.deceleration)
         elif math.isfinite(self.model.way_to_close):  # so slow a contact closes the layers later, as if at rest
-            distance = self.model.way_to_close + braking
+            distance = self.model.way_to_close + arm.stopping_way
         rest = self.model.static(distance)[0]
         return ContactCourse(
             peak=self.peak,

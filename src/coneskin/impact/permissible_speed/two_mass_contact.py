@@ -56,6 +56,11 @@ class DrivenArm:
         _check("arm.reaction", self.reaction, "s", least=0.0, infinite=True)
         _check("arm.deceleration", self.deceleration, "m/s^2", above=0.0)
 
+    @property
+    def stopping_way(self) -> float:
+        """How far it is driven from the closing of the layers on [m], if no force slows it."""
+        return self.speed * self.reaction + self.speed**2 / (2.0 * self.deceleration)
+
 
 @dataclass(frozen=True, slots=True)
 class StruckBody:
