@@ -73,7 +73,7 @@ def test_contacts_take_current_and_press_the_skin() -> None:
     for _ in range(180):
         q[0] += CYCLE
         state = plant.update(q, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    (press,) = plant.presses().values()
+    (press,) = plant.physics.presses.values()
     assert press.force == pytest.approx(plant.physics.force)
     assert press.sensor == SCENE.sensors[0].sensor.name
     assert press.u == pytest.approx(0.13, abs=0.01)

@@ -37,7 +37,7 @@ from coneskin.skin.virtual.skin import PressedSkin
 from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
 from .mujoco_plant import MujocoPlant
 from .scene_description import SheetOnLink
-from .scene_plant import currents_of, presses_of, sheets_of
+from .scene_plant import sheets_of
 
 _MAX_FORCE = 150.0  # N, at which the imitated limit stops the arm
 _FILTER_TIME = 0.01  # s
@@ -148,8 +148,8 @@ class CollisionRun:
     ) -> None:
         assert scene.arm is not None
         model = arm_model(scene.arm.model)
-        self._skins = sheets_of(scene)
-        self.plant = MujocoPlant(model, self._skins, bodies, scene.padding or Padding(), q, period=period, bare=bare)
+        padding = scene.padding or Padding()
+        self.plant = MujocoPlant(model, sheets_of(scene), bodies, padding, q, period=period, bare=bare)
         self.arm = MockArm(list(q), [0.0] * 6, heeds=heeds)
         self.meter = ImpactMeter()
         self.events: list[GuardEvent] = []
@@ -254,7 +254,7 @@ class CollisionRun:
         plant = self.plant
         rate = max((contact.rate for contact in plant.contacts), default=0.0)
         speed = max(map(abs, plant.qd))
-        touches = self._touches.feed(self.now, presses_of(plant, self._skins).values())
+        touches = self._touches.feed(self.now, plant.presses.values())
         for block in (self._truth.feed(self.now, plant.force, plant.places), touches):
             if block is not None:
                 self._note(block)
@@ -266,7 +266,7 @@ class CollisionRun:
         """Show the guard what skin, controller and processes send in this step."""
         for block in list(self._companions.blocks(self.now)):
             self._feed(block)
-        self._device.press(presses_of(self.plant, self._skins), _STEP_TIME)
+        self._device.press(self.plant.presses, _STEP_TIME)
         if self._unread:
             self._feed_new(BlockKind.SKIN, self._unread)
         self._unread = b"".join([next(self._packets)[1] for _ in self._device.sensors])
@@ -274,7 +274,7 @@ class CollisionRun:
         if not first:
             if self._steps % 20 == 0 and self._core.needs.slider:
                 self._feed_new(BlockKind.SLIDER, SLIDER.pack((self.arm.slider,)))
-            self._feed_new(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, currents_of(self.plant)))
+            self._feed_new(BlockKind.ARM, self.arm.packet(self.plant.q, self.plant.qd, self.plant.currents))
         self._feed_new(BlockKind.TICK)
 
     def _feed_new(self, kind: BlockKind, payload: bytes = b"") -> None:

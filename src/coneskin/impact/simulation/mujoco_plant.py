@@ -19,8 +19,10 @@ from coneskin.core.errors import MissingExtra
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
+from coneskin.skin.virtual.skin import Press
 
 from .scene_description import SheetOnLink, body_link, describe_scene
 
@@ -202,9 +204,26 @@ class MujocoPlant:
         return tuple(self._d.qfrc_applied[:_ARM_DOF].tolist())
 
     @property
+    def currents(self) -> list[float]:
+        """Current that each motor takes against the contacts [A]."""
+        return [-torque / each for torque, each in zip(self.external, TORQUE_PER_AMPERE, strict=True)]
+
+    @property
     def force(self) -> float:
         """Sum of the forces of all contacts now [N]."""
         return sum(contact.force for contact in self.contacts)
+
+    @property
+    def presses(self) -> dict[tuple[int, int], Press]:
+        """What the skins feel now, by skin and part of a body: contacts within their active area."""
+        found = {}
+        for contact in self.contacts:
+            skin = self._sheets[contact.sheet]
+            cone = skin.cone.frustum
+            active = 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap
+            if contact.sheet < self._skins and active:  # no bare part
+                found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
+        return found
 
     @property
     def energy(self) -> float:

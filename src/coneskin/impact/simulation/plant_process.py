@@ -27,9 +27,7 @@ if TYPE_CHECKING:
 _POLL_TIMEOUT = 1.0  # s between two looks at whether anybody is left
 _TRUTH_PERIOD = 0.01  # s from one recorded force to the next
 _PROCESS_NICENESS = -10  # niceness; behind the guard
-_RELAXED_CYCLES = (
-    500  # cycles after which the foam of a skin that nothing presses has come back: it need not be told more
-)
+_RELAXED_CYCLES = 500  # without a press, after which the foam of a skin has come back: it need not be told more
 
 
 def main(arguments: list[str]) -> int:
@@ -72,12 +70,12 @@ def main(arguments: list[str]) -> int:
                 return 1
             controller.send(encode_state(state))
             now = time.monotonic()  # before the skin can feel it: no touch begins after what is seen of it
-            presses = plant.presses()
+            physics = plant.physics
+            presses = physics.presses
             quiet = 0 if presses else quiet + 1
             if quiet < _RELAXED_CYCLES:
                 pressing = [[*key, *press] for key, press in presses.items()]
                 skin.send(encode_json({"step": CYCLE, "presses": pressing}))
-            physics = plant.physics
             for truth in (recorder.feed(now, physics.force, physics.places), touches.feed(now, presses.values())):
                 if truth is not None:
                     skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))

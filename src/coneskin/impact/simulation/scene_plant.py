@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 from coneskin.core.errors import SceneError
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.plant import PlantLost, PlantState
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.materials import Padding
-from coneskin.skin.virtual.skin import Press
 
 from .mujoco_plant import MujocoPlant
 from .scene_description import SheetOnLink
@@ -23,24 +21,6 @@ _CONTACT_PERIOD = 5  # steps of the integration from one look at the contacts to
 def sheets_of(scene: Scene) -> list[SheetOnLink]:
     """Return the skins of a scene on its arm."""
     return [SheetOnLink(item.name, item.link, item.frustum) for item in place_on_arm(scene)]
-
-
-def currents_of(plant: MujocoPlant) -> list[float]:
-    """Return the current that each motor takes against the contacts [A]."""
-    return [-torque / each for torque, each in zip(plant.external, TORQUE_PER_AMPERE, strict=True)]
-
-
-def presses_of(plant: MujocoPlant, skins: Sequence[SheetOnLink]) -> dict[tuple[int, int], Press]:
-    """Return what the skins feel now, by skin and part of a body: contacts within their active area."""
-    found = {}
-    for contact in plant.contacts:
-        if contact.sheet >= len(skins):
-            continue  # a bare part
-        skin = skins[contact.sheet]
-        cone = skin.cone.frustum
-        if 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap:
-            found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
-    return found
 
 
 class ScenePlant:
@@ -64,10 +44,8 @@ class ScenePlant:
     def __init__(self, scene: Scene, q: Sequence[float], period: int = _CONTACT_PERIOD) -> None:
         if scene.arm is None:
             raise SceneError(["a scene whose bodies are to be met needs an [arm]"], scene.name)
-        self._skins = sheets_of(scene)
-        padding = scene.padding or Padding()
-        model = arm_model(scene.arm.model)
-        self.physics = MujocoPlant(model, self._skins, scene.bodies, padding, list(q), period=period)
+        model, padding = arm_model(scene.arm.model), scene.padding or Padding()
+        self.physics = MujocoPlant(model, sheets_of(scene), scene.bodies, padding, q, period=period)
 
     def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         """Let one control cycle pass; see the protocol."""
@@ -75,11 +53,7 @@ class ScenePlant:
         self.physics.update(start, qd, CYCLE)
         if self.physics.diverged:
             raise PlantLost("the physics engine has diverged: the bodies are too light for their stiffness, perhaps")
-        return PlantState(self.physics.q, self.physics.qd, currents_of(self.physics))
+        return PlantState(self.physics.q, self.physics.qd, self.physics.currents)
 
     def close(self) -> None:
         """Do nothing: it has no process and no connection."""
-
-    def presses(self) -> dict[tuple[int, int], Press]:
-        """Return what the skins feel now; see `presses_of`."""
-        return presses_of(self.physics, self._skins)
