@@ -12,6 +12,7 @@ rs/(2 pi m).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ from .sheet import SectorSheet
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:
-    """n scenes of k discs each, checked; every array of shape (n, k).
+    """n scenes of k discs each; every array of shape (n, k).
 
     Attributes:
         u: slant distance of the centres [m].
@@ -38,6 +39,12 @@ class Discs:
     phi: Floats
     radius: Floats
     conductance: Floats
+
+    @classmethod
+    def of(cls, discs: Sequence[Disc]) -> Discs:
+        """Return one scene, unchecked."""
+        rows = np.array([[(disc.u, disc.phi, disc.radius, disc.conductance) for disc in discs]], dtype=np.float64)
+        return cls(*rows.transpose(2, 0, 1))
 
     def scenes(self, index: NDArray[np.intp]) -> Discs:
         """Return some of the scenes."""
@@ -61,12 +68,13 @@ class Disc:
     conductance: float = math.inf
 
 
-def check_discs(sheet: SectorSheet, u: Floats, phi: Floats, radius: Floats, conductance: Floats) -> None:
-    """Refuse discs that cannot exist; arrays of shape (n, k), k discs in each of n scenes.
+def check_discs(sheet: SectorSheet, discs: Discs) -> None:
+    """Refuse discs that cannot exist.
 
     Raises:
         FieldError: not finite, a radius not positive, a negative conductance, a disc across an edge, two that overlap.
     """
+    u, phi, radius, conductance = discs.u, discs.phi, discs.radius, discs.conductance
     for name, values, unit in (("u", u, "m"), ("phi", phi, "rad"), ("radius", radius, "m")):
         if not np.isfinite(values).all():
             raise FieldError(f"{name} of a contact must be finite [{unit}], got {values[~np.isfinite(values)].flat[0]}")

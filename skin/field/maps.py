@@ -35,14 +35,12 @@ class FieldMap:
         discs: the contacts; may be none, if the phase fixes both sheets without them.
         electrodes: potentials of A, B, C, D [V].
         moments: of the current of each disc [A], shape (k, 2M+1).
-        order: M.
     """
 
     model: FieldModel
     discs: tuple[Disc, ...]
     electrodes: tuple[float, float, float, float]
     moments: Floats
-    order: int
 
     @classmethod
     def of(cls, model: FieldModel, discs: Sequence[Disc], phase: DrivePhase) -> FieldMap:
@@ -56,12 +54,9 @@ class FieldMap:
             ghost = Disc(0.5 * sheet.width, 0.5 * sheet.wrap, 1e-3 * min(sheet.width, sheet.arc), 0.0)
             read = model.read(model.discs([ghost]), phase)
             a, b, c, d = (float(v) for v in read.electrodes[0])
-            return cls(model, (), (a, b, c, d), np.zeros((0, 3)), 1)
-        u, phi, radius, g = (
-            np.array([[getattr(disc, name) for disc in discs]]) for name in ("u", "phi", "radius", "conductance")
-        )
-        check_discs(sheet, u, phi, radius, g)
-        scene = Discs(u, phi, radius, g)
+            return cls(model, (), (a, b, c, d), np.zeros((0, 3)))
+        scene = Discs.of(discs)
+        check_discs(sheet, scene)
         # The readings are stationary in the moments, the potentials are not.
         tolerance = max(1e-3 * model.tolerance, 1e-15)
         order = int(resolution(sheet, scene, model.contrast, tolerance)[0])
@@ -69,8 +64,7 @@ class FieldMap:
             sheet, model.upper_resistance, model.lower_resistance, scene, order, tolerance
         )
         a, b, c, d = (float(v) for v in model.read(coupling, phase).electrodes[0])
-        values = moments.values[0] @ np.array([b - d, a - b, d - c])
-        return cls(model, tuple(discs), (a, b, c, d), values, moments.order)
+        return cls(model, tuple(discs), (a, b, c, d), moments[0] @ np.array([b - d, a - b, d - c]))
 
     def potentials(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
         """Return the potentials of the upper and of the lower sheet at (u, phi) [V]; arguments broadcast.
@@ -120,12 +114,12 @@ class FieldMap:
         if strip.sigma > 200.0 * math.pi:
             ratio = strip.sigma / math.pi
             raise FieldError(f"a map needs a sheet at most 200 times longer than wide, got {ratio:.0f} times")
-        one = Discs(*(np.array([[v]]) for v in (disc.u, disc.phi, disc.radius, disc.conductance)))
         # Each sheet alone has images in the edges, also where those of equal sheets cancel in the solver.
         room = float(sheet.edge_distances(disc.u, disc.phi).min()) / disc.radius
-        n = max(4 * self.order + 2, min(int(38.0 / math.acosh(max(room, 1.0005))), 1200))
-        zeta, _, fourier = circle(self.order, n)
-        source = make_circles(sheet, strip, one, self.order, n)
+        order = moments.size // 2
+        n = max(4 * order + 2, min(int(38.0 / math.acosh(max(room, 1.0005))), 1200))
+        zeta, _, fourier = circle(order, n)
+        source = make_circles(sheet, strip, Discs.of([disc]), order, n)
         charges = fourier.T @ moments
         flat = sheet.flat(u, phi, (disc.u, disc.phi)) / disc.radius
         by_a, by_b = np.empty(u.size), np.empty(u.size)
@@ -175,10 +169,11 @@ class FieldMap:
         ka = disc.radius * math.sqrt(rs * disc.conductance)
         inside = rho < 1.0
         out = np.where(inside, 0.0, -moments[0] * np.log(np.maximum(rho, 1.0)) / (2.0 * math.pi))
-        ratios = bessel_ratios(np.array(ka), self.order + 1)
+        order = moments.size // 2
+        ratios = bessel_ratios(np.array(ka), order + 1)
         bonded = math.isinf(ka)
         far = np.minimum(1.0 / np.maximum(rho, 1e-300), 1e300)
-        for m in range(self.order + 1):
+        for m in range(order + 1):
             wave = moments[0] if m == 0 else moments[2 * m - 1] * np.cos(m * angle) + moments[2 * m] * np.sin(m * angle)
             if m > 0:
                 out = out + wave / (2.0 * math.pi * m) * np.where(inside, rho**m, np.where(inside, 1.0, far) ** m)

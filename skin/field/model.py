@@ -107,14 +107,15 @@ class FieldModel:
         if arrays[0].ndim not in (0, 1, 2):
             raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
         shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]
-        check_discs(self.sheet, *shaped)
+        scenes = Discs(*shaped)
+        check_discs(self.sheet, scenes)
         if order is not None and order < 1:
             raise FieldError(f"order must be at least 1, got {order}")
         if order is None and shaped[0].shape[0] == 1:
             scene = list(zip(*(a[0].tolist() for a in shaped), strict=True))
             if (one := self._scenes.solve(scene)) is not None:
                 return one
-        return self._in_groups(Discs(*shaped), order)
+        return self._in_groups(scenes, order)
 
     def admittance(self, coupling: Coupling) -> Floats:
         """Compute Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""

@@ -9,7 +9,6 @@ conductance. The number of multipoles that a contact needs for a tolerance is fo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,19 +105,6 @@ def _truncation(order: int, from_half: Floats, from_last: Floats) -> Floats:
     return np.asarray(np.maximum(10.0 * from_last * ratio / (1.0 - ratio), 1e-3 * from_last))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Moments:
-    """Multipole moments of the current for each unit of h0, hx, hy.
-
-    Attributes:
-        order: M.
-        values: moments (Q_0, Q_1 cos, Q_1 sin, Q_2 cos, ...) of each disc [S], shape (n, k, 2M+1, 3).
-    """
-
-    order: int
-    values: Floats
-
-
 def solve_discs(
     sheet: SectorSheet,
     upper_resistance: float,
@@ -127,7 +113,7 @@ def solve_discs(
     order: int,
     points: int | None = None,
     with_moments: bool = False,
-) -> tuple[Coupling, _Moments | None]:
+) -> tuple[Coupling, Floats | None]:
     """Solve n scenes of k discs at one order.
 
     Args:
@@ -140,7 +126,8 @@ def solve_discs(
         with_moments: return the moments too (they take memory).
 
     Returns:
-        the coupling, its `error` from how fast the last multipoles die away, and the moments if wanted.
+        the coupling, its `error` from how fast the last multipoles die away, and the moments if wanted: of each disc
+            (Q_0, Q_1 cos, Q_1 sin, Q_2 cos, ...) for each unit of h0, hx and hy [S], shape (n, k, 2M+1, 3).
 
     Raises:
         LinAlgError: a system that far too low an order has made singular.
@@ -206,8 +193,7 @@ def solve_discs(
     coupling = Coupling.of_matrix(w, centre, np.maximum(_truncation(order, *tails), aliasing))
     if not with_moments:
         return coupling, None
-    values = (solved.reshape(n, size, k, 3) * scale[..., None] / rs).transpose(0, 2, 1, 3)
-    return coupling, _Moments(order, values)
+    return coupling, (solved.reshape(n, size, k, 3) * scale[..., None] / rs).transpose(0, 2, 1, 3)
 
 
 def _kept(order: int) -> tuple[int, int]:
@@ -237,7 +223,7 @@ def _solve_single(
     order: int,
     aspects: tuple[float, float],
     with_moments: bool,
-) -> tuple[Coupling, _Moments | None]:
+) -> tuple[Coupling, Floats | None]:
     """Solve one disc in each scene; eliminating the total current first keeps even a weak contact exact."""
     n, size = block.shape[0], 2 * order
     scale = np.repeat(root, 2, axis=1)
@@ -270,13 +256,16 @@ def _solve_single(
     rest = -solved[:, :, :1] * total[:, None, :] * rs
     rest[:, :, 1:] += solved[:, :, 1:]
     values[:, 0, 1:] = rest * scale[:, :, None] / rs
-    return coupling, _Moments(order, values)
+    return coupling, values
 
 
 def solve_to_tolerance(
     sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, order: int, tolerance: float
-) -> tuple[Coupling, _Moments]:
+) -> tuple[Coupling, Floats]:
     """Solve one scene by multipoles at the first order from `order` on whose error is within the tolerance.
+
+    Returns:
+        the coupling and the moments, as of `solve_discs`.
 
     Raises:
         FieldError: even the highest order misses it.
