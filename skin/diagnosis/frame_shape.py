@@ -36,15 +36,11 @@ def find_shape(data: bytes) -> Finding | None:
     if count < _AGREEING_SHARE * headers.total() or len(header) < 2:
         return None
     version, length = header
-    frames = [data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)]
     if share < _AGREEING_SHARE:
-        # the frames of one length may have something between them
-        period = length if length in FRAME_LENGTHS else 0
-        frames = [
-            data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)
-        ]
-        if not period:
+        if length not in FRAME_LENGTHS:
             return None
+        period = length  # the frames of one length may have something between them
+    frames = [data[at : at + period] for at in places if data[at + 2 : at + 4] == header and at + period <= len(data)]
     frames = frames[-_SAMPLE_COUNT:]
     if version == VERSION and length in FRAME_LENGTHS:
         if period == length:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import gcd
 from statistics import median_high
 
@@ -14,14 +14,9 @@ from coneskin.skin.wire import Frame, Status
 from .capture import swap_bytes
 from .cause import Cause
 
+_MEASURED_FIELDS = slice(Frame._fields.index("touch_c"), Frame._fields.index("driven"))
 #: The measured fields of a frame, in the order of the wire.
-MEASURED = (
-    *("touch_c", "touch_d", "touch_current"),
-    *("radial_c", "radial_d", "radial_current"),
-    *("angular_a", "angular_b", "angular_current"),
-    *("touch_supply", "radial_supply", "angular_supply"),
-)
-_FIRST_MEASURED = Frame._fields.index(MEASURED[0])
+MEASURED = Frame._fields[_MEASURED_FIELDS]
 _SUPPLY_AT = MEASURED.index("touch_supply")
 _RADIAL_AT, _ANGULAR_AT = MEASURED.index("radial_current"), MEASURED.index("angular_current")
 _GUIDE_PLACES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", "angular_a", "angular_b"))
@@ -32,13 +27,7 @@ _UNTOUCHED_SHARE = 0.03  # of the supply, on both guides of the touch phase toge
 _REMARKABLE_HUM = 0.004  # of the supply, on a guide; it moves a place by as much of the sheet
 _NEAR_SHARE = 0.06  # a reading is another one
 _FULL_SCALES = (255, 1023, 4095, 16383, 65535)
-_STATUS_NAMES = {
-    Status.SUPPLY: "SUPPLY",
-    Status.ADC: "ADC",
-    Status.OVERRUN: "OVERRUN",
-    Status.SELF_TEST: "SELF_TEST",
-    Status.OVERCURRENT: "OVERCURRENT",
-}
+_STATUS_FAULTS = (Status.SUPPLY, Status.ADC, Status.OVERRUN, Status.SELF_TEST, Status.OVERCURRENT)
 
 
 def expected_counts(sensor: Sensor) -> tuple[int, ...]:
@@ -73,7 +62,7 @@ def find_big_endian(frames: Sequence[Frame]) -> Finding | None:
 
 
 def _measured(frame: Frame) -> tuple[int, ...]:
-    return frame[_FIRST_MEASURED : _FIRST_MEASURED + len(MEASURED)]  # type: ignore[return-value]  # integers, all of them
+    return frame[_MEASURED_FIELDS]  # type: ignore[return-value]  # integers, all of them
 
 
 def find_status(frames: Sequence[Frame]) -> Finding | None:
@@ -87,9 +76,9 @@ def find_status(frames: Sequence[Frame]) -> Finding | None:
         return Cause.RESTARTS.found(f"the device has started {restarts} times in {len(frames)} frames")
     if sum(bool(frame.status & Status.RESERVED) for frame in frames) > 0.1 * len(frames):
         return Cause.STATUS_RESERVED.found(f"the status is 0x{frames[-1].status:02X}, with its reserved bit")
-    for bit, name in _STATUS_NAMES.items():
+    for bit in _STATUS_FAULTS:
         if sum(bool(frame.status & bit) for frame in frames) > 0.1 * len(frames):
-            return Cause.STATUS.found(f"the device reports {name} in its status")
+            return Cause.STATUS.found(f"the device reports {bit.name} in its status")
     return None
 
 
@@ -220,25 +209,24 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
 
 def _measure_hum(columns: _Columns) -> float:
     """Return the amplitude of what swings on the untouched guides [counts]; they stand at 0, which cuts half of it."""
-    untouched = [
-        c + d < _UNTOUCHED_SHARE * s for c, d, s in zip(columns[0], columns[1], columns[_SUPPLY_AT], strict=True)
-    ]
-    most = 0.0
-    for k in _GUIDE_PLACES:
-        column = list(itertools.compress(columns[k], untouched))
-        if len(column) >= _MIN_FRAMES:
-            most = max(most, 2.0 * (sum(count * count for count in column) / len(column)) ** 0.5)
-    return most
+    squares = (sum(count * count for count in column) / len(column) for _, column in _untouched_guides(columns))
+    return 2.0 * max(squares, default=0.0) ** 0.5
+
+
+def _untouched_guides(columns: _Columns) -> Iterator[tuple[int, list[int]]]:
+    """Yield the place of each guide and its counts while nothing touches the sensor, where these are enough."""
+    touch_c, touch_d, supply = columns[0], columns[1], columns[_SUPPLY_AT]
+    untouched = [c + d < _UNTOUCHED_SHARE * s for c, d, s in zip(touch_c, touch_d, supply, strict=True)]
+    if sum(untouched) >= _MIN_FRAMES:
+        for k in _GUIDE_PLACES:
+            yield k, list(itertools.compress(columns[k], untouched))
 
 
 def _find_floating(columns: _Columns) -> Finding | None:
     """Find guides that wander although nothing touches the sensor."""
     supply = median_high(columns[_SUPPLY_AT])
-    untouched = [c + d < _UNTOUCHED_SHARE * supply for c, d in zip(columns[0], columns[1], strict=True)]
-    if sum(untouched) < _MIN_FRAMES:
-        return None
-    for k in _GUIDE_PLACES:
-        column = sorted(itertools.compress(columns[k], untouched))
+    for k, counts in _untouched_guides(columns):
+        column = sorted(counts)
         spread = column[int(0.95 * (len(column) - 1))] - column[int(0.05 * (len(column) - 1))]
         if spread > max(0.02 * supply, 12.0):
             what = f"{MEASURED[k]} wanders by {spread:.0f} counts although nothing touches the sensor"

@@ -10,6 +10,7 @@ from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
+from coneskin.skin.diagnosis.measurements import MEASURED
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
 
 if TYPE_CHECKING:
@@ -17,10 +18,7 @@ if TYPE_CHECKING:
 
     from coneskin.skin.sensor import Sensor
 
-_CHANNELS = (
-    *("touch_c", "touch_d", "touch_current", "radial_c", "radial_d", "radial_current"),
-    *("angular_a", "angular_b", "angular_current", "touch_supply"),
-)
+_CHANNELS = MEASURED[:10]  # of the supplies, one
 _MAX_FRAMES = 20_000  # frames that are kept of a sensor
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -98,7 +99,7 @@ class _Touch:
         self._sensor, self._place, self._read = sensor, place, read
         polarity = replace(sensor.polarity, angular="D" if sensor.c_positive else "C")
         self._driven = {False: sensor, True: replace(sensor, polarity=polarity)}
-        self._sheets: dict[tuple[float, float, float], Matrix] = {}
+        self._sheets = cache(self._admittance)
         self._siemens: dict[Wiring, float] = {}
 
     def rough(self, wiring: Wiring) -> float:
@@ -127,7 +128,7 @@ class _Touch:
 
     def _squares(self, wiring: Wiring, along: float, around: float, siemens: float) -> float:
         sensor, parts = self._driven[wiring.angular_turned], self._sensor.electronics
-        sheets = reorder(self._admittance(along, around, siemens), _ORDER_INDICES[wiring.wires])
+        sheets = reorder(self._sheets(along, around, siemens), _ORDER_INDICES[wiring.wires])
         at = measure(sensor, (sheets, sheets, sheets))
         current = max(sensor.radial_amperes, sensor.angular_amperes) / parts.current_full_scale
         total = 0.0
@@ -141,12 +142,9 @@ class _Touch:
         return total
 
     def _admittance(self, along: float, around: float, siemens: float) -> Matrix:
-        key = along, around, siemens
-        if key not in self._sheets:
-            cone, (u, phi) = self._sensor.frustum, self._place
-            contact = LayerContact(u + along * cone.slant, phi + around * cone.wrap, siemens)
-            self._sheets[key] = ResistorLadder().admittance(self._sensor, (contact,))
-        return self._sheets[key]
+        cone, (u, phi) = self._sensor.frustum, self._place
+        contact = LayerContact(u + along * cone.slant, phi + around * cone.wrap, siemens)
+        return ResistorLadder().admittance(self._sensor, (contact,))
 
 
 _RIGHT_ORDER = _ORDERS[0]
