@@ -54,27 +54,17 @@ class Foam:
         if not 0.0 <= self.delayed < 1.0:
             raise SensorError(f"delayed must be in [0, 1), got {self.delayed!r}")
 
-    def advance(self, state: float, force: float, time: float) -> float:
-        """Return the delayed part's state [N] after a constant force has acted; exact for any step.
+    def advance(self, state: float, force: float, time: float, slope: float = 0.0) -> float:
+        """Return the delayed part's state [N] after a force has acted that stays or changes evenly; exact for any step.
 
         Args:
             state: before; 0 at rest.
-            force: on the skin [N].
-            time: for how long [s]; may be infinite.
-        """
-        return force + (state - force) * math.exp(-time / self.relaxation_time)
-
-    def advance_ramp(self, state: float, force: float, slope: float, time: float) -> float:
-        """Return the same while the force changes evenly; exact too.
-
-        Args:
-            state: before [N].
-            force: at the beginning [N].
+            force: on the skin at the beginning [N].
+            time: for how long [s]; may be infinite where the force stays.
             slope: of the force [N/s].
-            time: for how long [s].
         """
-        lag = slope * self.relaxation_time
-        return force + slope * time - lag + (state - force + lag) * math.exp(-time / self.relaxation_time)
+        grown, lag = slope * time if slope else 0.0, slope * self.relaxation_time
+        return force + grown - lag + (state - force + lag) * math.exp(-time / self.relaxation_time)
 
     def advance_swing(self, state: float, mean: float, swing: float, rate: float, angle: float, time: float) -> float:
         """Return the same while the force is mean - swing cos(angle + rate t), t from 0 to time; exact too.

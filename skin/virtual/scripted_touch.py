@@ -135,7 +135,7 @@ class ScriptedTouch:
             state = foam.advance_swing(state, swing, swing, rate, 0.0, min(since, ramp))
         held = min(max(since - ramp, 0.0), length - 2.0 * ramp)
         growing = min(held, self.growth_time)
-        state = foam.advance_ramp(state, self.force, slope, growing)
+        state = foam.advance(state, self.force, growing, slope)
         state = foam.advance(state, self._risen(growing), held - growing)
         swing = 0.5 * self._risen(growing)
         if ramp > 0.0 and since > length - ramp:
@@ -227,28 +227,14 @@ def palm_over_seam(cone: Frustum, touch: ScriptedTouch, angle: float) -> list[Sc
     return _at(cone, touch, [(touch.u, angle), (touch.u, cone.wrap - angle)])
 
 
-def grip(cone: Frustum, touch: ScriptedTouch, second_force: float | None = None) -> list[ScriptedTouch]:
+def grip(cone: Frustum, touch: ScriptedTouch) -> list[ScriptedTouch]:
     """Press on opposite sides at equal u, as a hand does that closes around the link.
 
     Args:
         cone: the active area.
         touch: the first press.
-        second_force: of the opposite one [N]; as the first by default.
     """
-    return clamp(cone, touch, touch.u, second_force)
-
-
-def clamp(cone: Frustum, touch: ScriptedTouch, u: float, second_force: float | None = None) -> list[ScriptedTouch]:
-    """Press on opposite sides at two places along the link, as it does that is caught between two things.
-
-    Args:
-        cone: the active area.
-        touch: the first press.
-        u: slant distance of the opposite one from end 1 [m].
-        second_force: of the opposite one [N]; as the first by default.
-    """
-    first, second = _at(cone, touch, [(touch.u, touch.phi), (u, (touch.phi + math.pi) % (2.0 * math.pi))])
-    return [first, second if second_force is None else replace(second, force=second_force)]
+    return _at(cone, touch, [(touch.u, touch.phi), (touch.u, (touch.phi + math.pi) % (2.0 * math.pi))])
 
 
 def fingers(cone: Frustum, touch: ScriptedTouch, offsets: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -14,7 +15,7 @@ from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual import scripted_touch
 from coneskin.skin.virtual.imperfections import ContactLaw, Foam, Imperfections
-from coneskin.skin.virtual.scripted_touch import ScriptedTouch, across_seam, clamp, fingers, grip, palm_over_seam
+from coneskin.skin.virtual.scripted_touch import ScriptedTouch, across_seam, fingers, palm_over_seam
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.virtual.typed_script import TOUCH_SHAPES, parse_press
 
@@ -126,12 +127,17 @@ def read(cone: Frustum, touches: Sequence[ScriptedTouch], end: float = 0.3) -> l
     return found
 
 
+def opposite(touch, **changes):
+    """A press and another one on the other side of the link."""
+    return [touch, replace(touch, phi=(touch.phi + math.pi) % (2.0 * math.pi), **changes)]
+
+
 @pytest.mark.parametrize(
     "shape",
     [
         palm_over_seam(FOREARM, TOUCH, math.radians(20.0)),
-        grip(FOREARM, TOUCH, 3.0),
-        clamp(FOREARM, TOUCH, 0.05),
+        opposite(TOUCH, force=3.0),
+        opposite(TOUCH, u=0.05),
         fingers(FOREARM, TOUCH, [(-0.02, -0.03), (0.02, 0.03)]),
     ],
     ids=["palm", "uneven grip", "clamp", "fingers"],
