@@ -135,12 +135,8 @@ def _pairs(order: int) -> Floats:
 
 def _other_disc(sheet: SectorSheet, discs: Discs, i: int, j: int) -> tuple[Complex, Complex]:
     """Return alpha, beta of |z_i - z_j| = const |1 + alpha zeta + beta zeta'|, circle i to circle j, shape (n,)."""
-    kappa = sheet.curvature
-    turn = kappa * sheet.arc * (discs.phi[:, j] - discs.phi[:, i]) / sheet.wrap
-    w = (sheet.along(discs.u[:, j])[0] - sheet.along(discs.u[:, i])[0]) + 1j * (
-        sheet.across(discs.phi[:, j])[0] - sheet.across(discs.phi[:, i])[0]
-    )
-    towards = w if kappa == 0.0 else sheet.stretch(discs.u[:, i]) * np.expm1(kappa * w) / kappa
+    turn = sheet.curvature * sheet.arc * (discs.phi[:, j] - discs.phi[:, i]) / sheet.wrap
+    towards = sheet.flat(discs.u[:, j], discs.phi[:, j], (discs.u[:, i], discs.phi[:, i]))
     # Beyond half a turn the flat sheet may lap over itself; the chord means nothing there.
     near = np.abs(turn) < math.pi
     alpha = np.where(near, -discs.radius[:, i] / towards, 0.0)

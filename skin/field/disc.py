@@ -111,17 +111,9 @@ def check_discs(sheet: SectorSheet, discs: Discs) -> None:
 
 def centre_distance(sheet: SectorSheet, u1: Floats, phi1: Floats, u2: Floats, phi2: Floats) -> Floats:
     """Return the distance of two points in the flat sheet [m]; inf beyond half a turn, where the sheet bends back."""
-    x1, _ = sheet.along(u1)
-    x2, _ = sheet.along(u2)
-    y1, _ = sheet.across(phi1)
-    y2, _ = sheet.across(phi2)
-    w = (x2 - x1) + 1j * (y2 - y1)
-    if sheet.curvature == 0.0:
-        return np.asarray(np.abs(w))
-    angle = sheet.curvature * (y2 - y1)
-    near = np.asarray(sheet.stretch(u1) * np.abs(np.expm1(sheet.curvature * w) / sheet.curvature))
+    angle = sheet.curvature * (sheet.across(phi2)[0] - sheet.across(phi1)[0])
     # Beyond half a turn the way inside the sheet is longer than the chord; the discs cannot meet there.
-    return np.where(np.abs(angle) < math.pi, near, math.inf)
+    return np.where(np.abs(angle) < math.pi, np.abs(sheet.flat(u2, phi2, (u1, phi1))), math.inf)
 
 
 def bessel_ratios(x: ArrayLike, order: int) -> Floats:

@@ -172,12 +172,8 @@ class SectorSheet:
             out[..., 2:] = np.where(np.abs(angle) < 0.5 * math.pi, straight, math.inf)
         return out
 
-    def flat(self, u: ArrayLike, phi: ArrayLike, at: tuple[float, float]) -> NDArray[np.complex128]:
+    def flat(self, u: ArrayLike, phi: ArrayLike, at: tuple[ArrayLike, ArrayLike]) -> NDArray[np.complex128]:
         """Return flat coordinates along (e_u, e_phi) of the point `at`, measured from it [m], complex."""
-        x, _ = self.along(u)
-        y, _ = self.across(phi)
-        x0, _ = self.along(at[0])
-        y0, _ = self.across(at[1])
-        w = (x - x0) + 1j * (y - y0)
+        w = (self.along(u)[0] - self.along(at[0])[0]) + 1j * (self.across(phi)[0] - self.across(at[1])[0])
         kappa = self.curvature
         return np.asarray(w if kappa == 0.0 else self.stretch(at[0]) * np.expm1(kappa * w) / kappa, dtype=np.complex128)
