@@ -18,12 +18,6 @@ from typing import Literal, NamedTuple
 from coneskin.core.errors import SensorError
 
 
-def _check_positive(owner: str, values: dict[str, tuple[float, str]]) -> None:
-    for name, (value, unit) in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise SensorError(f"{owner}.{name} must be finite and above 0 {unit}, got {value!r} {unit}")
-
-
 class LeadOhms(NamedTuple):
     """Resistance of the wire and the switch of each electrode [ohm]."""
 
@@ -72,7 +66,9 @@ class Electronics:
         values = {f.name: (getattr(self, f.name), units.get(f.name, "ohm")) for f in fields(self)}
         del values["adc_bits"], values["lead_ohms"]
         values |= {f"lead_ohms.{name}": (ohms, "ohm") for name, ohms in self.lead_ohms._asdict().items()}
-        _check_positive("electronics", values)
+        for name, (value, unit) in values.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise SensorError(f"electronics.{name} must be finite and above 0 {unit}, got {value!r} {unit}")
         if not (isinstance(self.adc_bits, int) and 8 <= self.adc_bits <= 16):
             raise SensorError(f"electronics.adc_bits must be a whole number from 8 to 16, got {self.adc_bits!r}")
         if self.supply_volts > 0.95 * self.adc_volts:
@@ -203,24 +199,14 @@ _PULLDOWN_RATIO = 2.0  # over the larger sheet resistance: a guide behind the wh
 
 @dataclass(frozen=True, slots=True)
 class GivenElectronics:
-    """Electronics as far as they are given; None: to be chosen.
-
-    Attributes:
-        supply_volts: as in Electronics, and so are the others.
-        adc_volts: see there.
-        adc_bits: see there.
-        pulldown_ohms: see there.
-        input_ohms: see there.
-        lead_ohms: see there.
-        current_full_scale: see there.
-    """
+    """Electronics as far as they are given, with the attributes of `Electronics`; None: to be chosen."""
 
     supply_volts: float | None = None
     adc_volts: float = 3.3
     adc_bits: int | None = None
     pulldown_ohms: float | None = None
     input_ohms: float = 10e6
-    lead_ohms: LeadOhms = LeadOhms(1.0, 1.0, 1.0, 1.0)  # noqa: RUF009  # a tuple
+    lead_ohms: LeadOhms = _ONE_OHM
     current_full_scale: float | None = None
 
 

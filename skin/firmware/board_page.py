@@ -103,6 +103,7 @@ def _settings(circuit: BoardCircuit) -> list[str]:
 _WIDTH, _HEIGHT = 1080, 840
 _BOARD, _SWITCH, _RAIL, _SHEET = 230, 430, 560, 880  # x of the board's edge, the switches, the rail, the electrodes
 _FIRST, _ROW = 230, 150  # y of electrode A, and from one to the next
+_ELECTRODE_PLACES = "upper sheet, end 2", "upper sheet, end 1", "lower sheet, phi = wrap", "lower sheet, phi = 0"
 _SVG_STYLE = (
     "text{font:14px sans-serif;fill:#222}.small{font-size:12px;fill:#555}.title{font-size:18px;font-weight:bold}"
     "path,rect,circle{fill:none;stroke:#222;stroke-width:1.5}.part{fill:#fff}.rail{stroke:#b02a1a;stroke-width:2.5}"
@@ -191,16 +192,9 @@ def _electrode(circuit: BoardCircuit, row: int) -> list[str]:
         _line((_BOARD, y + 78), (_SHEET - 30, y + 78), (_SHEET - 30, y + 12), (_SHEET, y + 12), css="sense"),
         f'<rect class="body" x="{_SHEET}" y="{y - 24}" width="175" height="56" rx="4"/>',
         _text(_SHEET + 12, y - 2, f"electrode {name}"),
-        _text(_SHEET + 12, y + 18, _where(name), "small"),
+        _text(_SHEET + 12, y + 18, _ELECTRODE_PLACES[row], "small"),
     ]
     return out
-
-
-def _where(name: str) -> str:
-    """Return where an electrode is on the sensor."""
-    ends = {"A": "upper sheet, end 2", "B": "upper sheet, end 1"}
-    edges = {"C": "lower sheet, phi = wrap", "D": "lower sheet, phi = 0"}
-    return {**ends, **edges}[name]
 
 
 def _pin(circuit: BoardCircuit, y: int, purpose: str, pin: str) -> list[str]:

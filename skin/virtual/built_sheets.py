@@ -237,7 +237,7 @@ class BuiltSheets:
     """
 
     def __init__(self, flaws: tuple[SheetFlaws, SheetFlaws], exact: ContactModel) -> None:
-        self._flaws, self._exact = flaws, exact
+        self._exact = exact
         self._pairs = lru_cache(maxsize=16)(lambda sensor: (_Pair(sensor, flaws), _Pair(sensor, _IDEAL_FLAWS)))
 
     def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:

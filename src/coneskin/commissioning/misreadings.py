@@ -28,13 +28,6 @@ class Place(NamedTuple):
     phi: float  #: azimuth [rad]
 
 
-class _Tolerance(NamedTuple):
-    """Difference between a mark and its reading that is allowed."""
-
-    u: float  #: along the link [m]
-    phi: float  #: about the link [rad]
-
-
 class _Misreading(NamedTuple):
     """One way to read a place wrongly."""
 
@@ -71,11 +64,11 @@ WRONG = (
 )
 
 
-def tolerance(sensor: Sensor) -> _Tolerance:
-    """Return how far from its mark a reading may be: 20 mm and 25 deg, less on a small sensor."""
+def tolerance(sensor: Sensor) -> Place:
+    """Return how far from its mark a reading may be, along and about: 20 mm and 25 deg, less on a small sensor."""
     cone = sensor.frustum
     along, around = MAX_MISS
-    return _Tolerance(min(along, _MAX_PART * cone.slant), min(around, _MAX_PART * cone.wrap))
+    return Place(min(along, _MAX_PART * cone.slant), min(around, _MAX_PART * cone.wrap))
 
 
 def misread(sensor: Sensor, wrong: _Misreading, place: Place) -> Place:

@@ -55,6 +55,12 @@ class SensorMarks:
         """True once a mark was not read where it is."""
         return any(not result.passed for result in self.results)
 
+    @property
+    def located(self) -> tuple[list[Place], list[Place]]:
+        """Marks that were read at some place of this sensor, and these places."""
+        pairs = [(mark.place, read) for mark, read in zip(self.plan, self.read, strict=False) if not math.isnan(read.u)]
+        return [mark for mark, _ in pairs], [read for _, read in pairs]
+
 
 class Procedure(TouchJudge["TouchReading"]):
     """Procedure over the sensors of a scene, one mark after the other.
@@ -150,30 +156,26 @@ class Procedure(TouchJudge["TouchReading"]):
         item.results.append(result)
         item.read.append(read)
         self._attempts, self.mark = 0, None
-        marks = [place.place for place in item.plan[: len(item.results)]]
         if wrong:
             item.cause = wrong
         elif not passed and not item.cause.endswith("was touched"):
-            clean = [(place, seen) for place, seen in zip(marks, item.read, strict=True) if not math.isnan(seen.u)]
-            item.cause = explain(item.sensor, [place for place, _ in clean], [seen for _, seen in clean])
+            item.cause = explain(item.sensor, *item.located)
         text = said if passed else f"{said}: {item.cause}"
         details = {"sensor": item.sensor.name, "passed": passed, "read_u_mm": read_u, "read_phi_deg": read_phi}
         details |= {"distance_mm": result.distance_mm, "level": result.level, "cause": "" if passed else item.cause}
         notices = [Notice("passed" if passed else "failed", text, details)]
         if len(item.results) == len(item.plan):
-            notices.append(self._finish(item, marks))
+            notices.append(self._finish(item))
         return notices
 
-    def _finish(self, item: SensorMarks, marks: list[Place]) -> Notice:
+    def _finish(self, item: SensorMarks) -> Notice:
         """Judge a sensor whose marks were all touched, and go on to the next one."""
-        seen = [(place, read) for place, read in zip(marks, item.read, strict=True) if not math.isnan(read.u)]
-        if not item.failed:
-            allowed = tolerance(item.sensor)
-            fit = misfit(item.sensor, RIGHT, marks, item.read)
-            if abs(fit.u) > _SYSTEMATIC_PART * allowed.u or abs(fit.phi) > _SYSTEMATIC_PART * allowed.phi:
-                item.cause = explain(item.sensor, marks, item.read)
-        elif len(seen) == len(item.read):
-            item.cause = explain(item.sensor, marks, item.read)
+        marks, read = item.located
+        if len(read) == len(item.read):  # else the cause is an exchange of sheets, and stays
+            allowed, fit = tolerance(item.sensor), misfit(item.sensor, RIGHT, marks, read)
+            off = abs(fit.u) > _SYSTEMATIC_PART * allowed.u or abs(fit.phi) > _SYSTEMATIC_PART * allowed.phi
+            if item.failed or off:
+                item.cause = explain(item.sensor, marks, read)
         self._number += 1
         self.over = self._number == len(self.sensors)
         details = {"sensor": item.sensor.name, "passed": not item.cause, "cause": item.cause}

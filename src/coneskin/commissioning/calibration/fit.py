@@ -24,9 +24,8 @@ from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from coneskin.core.arrays import Floats
     from coneskin.skin.sensor import Sensor
-
-    Floats = NDArray[np.float64]
 
 MIN_TOUCHES = 4  #: at different places
 _MIN_EXTENT = 0.3  # of the sheet, between the outermost of them
