@@ -114,12 +114,9 @@ def solve_discs(
     points: int | None = None,
     with_moments: bool = False,
 ) -> tuple[Coupling, Floats | None]:
-    """Solve n scenes of k discs at one order.
+    """Solve n scenes of k discs at one order; sheet and resistances as of `FieldModel`.
 
     Args:
-        sheet: the sheet.
-        upper_resistance: of the sheet with the electrodes A and B [ohm per square].
-        lower_resistance: of the sheet with the electrodes C and D [ohm per square].
         discs: the scenes, checked.
         order: M, at least 1.
         points: N on each circle, above 2M; None takes 2M + 2.

@@ -385,7 +385,8 @@ class SceneSolver:
         found = _totals(gram.tolist(), charges, x, y)
         one_less = _totals(less.tolist(), charges, x, y)
         two_less = _totals((less - before.dot(before.T)).tolist(), charges, x, y) if order > 1 else one_less
-        change, earlier = self._change(found, one_less), self._change(one_less, two_less)
+        change = solution_change(found, one_less, self._units)
+        earlier = solution_change(one_less, two_less, self._units)
         ratio = min(max(decay, change / earlier if change < earlier else decay), 0.9)
         rest = (
             (_SAFETY_FACTOR if order > 1 else 2.0 * _SAFETY_FACTOR)
@@ -397,26 +398,26 @@ class SceneSolver:
         numbers = g / self._total, x_mean, y_mean, xx / self._total, xy / self._total, yy / self._total
         return Coupling(*np.array([*numbers, max(rest, least_error)]).reshape(7, 1))
 
-    def _change(self, one: tuple[float, ...], other: tuple[float, ...]) -> float:
-        """Return how far apart two solutions are, as `Coupling.error` counts it."""
-        g, x, y, xx, xy, yy = one
-        g2, x2, y2, xx2, xy2, yy2 = other
-        relative = abs(g - g2) / g if g > 0.0 else 0.0
-        along, diagonal, around = self._units
-        tensor = max(abs(xx - xx2) * along, abs(xy - xy2) * diagonal, abs(yy - yy2) * around)
-        return max(relative, abs(x - x2), abs(y - y2), tensor)
+
+def solution_change(one: tuple[float, ...], other: tuple[float, ...], units: tuple[float, ...]) -> float:
+    """Return how far apart the six numbers of two solutions are, as `Coupling.error` counts it.
+
+    Args:
+        one: as of `Coupling`.
+        other: another solution.
+        units: what makes xx, xy and yy numbers: the resistances of the bare sheets along, their mean, around [ohm].
+    """
+    g, x, y, xx, xy, yy = one
+    g2, x2, y2, xx2, xy2, yy2 = other
+    relative = abs(g - g2) / g if g > 0.0 else 0.0
+    along, diagonal, around = units
+    tensor = max(abs(xx - xx2) * along, abs(xy - xy2) * diagonal, abs(yy - yy2) * around)
+    return max(relative, abs(x - x2), abs(y - y2), tensor)
 
 
 @lru_cache(maxsize=64)
 def scene_solver(sheet: SectorSheet, upper_resistance: float, lower_resistance: float, tolerance: float) -> SceneSolver:
-    """Return the solver of scenes on these sheets; equal ones share it.
-
-    Args:
-        sheet: the sheet.
-        upper_resistance: of the sheet with the electrodes A and B [ohm per square].
-        lower_resistance: of the sheet with the electrodes C and D [ohm per square].
-        tolerance: of the estimated error, relative to the supply.
-    """
+    """Return the solver of scenes on these sheets; equal ones share it. Arguments as of `FieldModel`."""
     return SceneSolver(sheet, upper_resistance, lower_resistance, tolerance)
 
 

@@ -27,6 +27,7 @@ from .circles import Centres, offsets_of, pair_points
 from .disc import Discs
 from .fourport import Coupling
 from .green import Strip, kernel
+from .one_scene import solution_change
 from .sheet import SectorSheet
 
 _SCALE_FACTOR = 4.0  # from one scale to the next
@@ -143,48 +144,38 @@ def near_apex(sheet: SectorSheet, discs: Discs) -> bool:
 def solve_rims(
     sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, tolerance: float
 ) -> Coupling:
-    """Solve one scene of k discs.
+    """Solve one scene of k discs; sheet and resistances as of `FieldModel`.
 
     Args:
-        sheet: the sheet.
-        upper_resistance: of the sheet with the electrodes A and B [ohm per square].
-        lower_resistance: of the sheet with the electrodes C and D [ohm per square].
         discs: one scene, checked.
         tolerance: of the supply, at which to stop.
 
     Returns:
         the coupling; its error is above the tolerance, or not finite, where that could not be met.
     """
-    best: Coupling | None = None
     units = (
         upper_resistance * sheet.length / sheet.breadth,
         math.sqrt(upper_resistance * lower_resistance),
         lower_resistance * sheet.breadth / sheet.length,
     )
-    x, y = np.array([sheet.along(discs.u)[0].mean() / sheet.length]), np.array([(discs.phi / sheet.wrap).mean()])
-    before = math.inf
+    middle = sheet.along(discs.u)[0].mean() / sheet.length, (discs.phi / sheet.wrap).mean()
+    best: tuple[float, ...] = ()
+    before = error = math.inf
     for density in _POINT_DENSITIES:
         w = _solve(sheet, upper_resistance, lower_resistance, discs, density)
         if w is None:
             break
-        got = Coupling.of_matrix(w[None], np.zeros((1, 2)))
-        error = math.inf
-        if best is not None:
-            changes = [got.conductance / best.conductance - 1.0, got.x + x - best.x, got.y + y - best.y]
-            changes += [
-                (getattr(got, n) - getattr(best, n)) * r for n, r in zip(("xx", "xy", "yy"), units, strict=True)
-            ]
-            change = max(float(np.abs(v[0])) for v in changes)
+        g, x, y, *tensor = (float(v) for v in Coupling.of_matrix(w[None], np.zeros((1, 2))).numbers())
+        got = g, x + float(middle[0]), y + float(middle[1]), *tensor
+        if best:
+            change = solution_change(got, best, units)
             # The rest of a geometric series, once it is known to be one.
             error = change if change > 0.1 * before or math.isinf(before) else 10.0 * change * change / before
             before = change
-        best = Coupling(got.conductance, got.x + x, got.y + y, got.xx, got.xy, got.yy, np.array([error]))
+        best = got
         if error <= tolerance:
             break
-    if best is None:
-        nothing = np.full(1, math.nan)
-        return Coupling(nothing, nothing, nothing, nothing, nothing, nothing, np.full(1, math.inf))
-    return best
+    return Coupling(*np.array([*(best or (math.nan,) * 6), error]).reshape(7, 1))
 
 
 def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density: int) -> Floats | None:
