@@ -148,14 +148,11 @@ def _phase(
         sources[k] += feeds[k] * parts.supply_volts if terminal == "supply" else 0.0
     for first, second in wiring.shorts:
         j = _TERMINAL_NAMES.index(first)
-        matrix[j][j] += _SHORT_CONDUCTANCE
-        if second in ("supply", "rail"):
-            sources[j] += _SHORT_CONDUCTANCE * parts.supply_volts
-        elif second != "ground":
-            k = _TERMINAL_NAMES.index(second)
-            matrix[k][k] += _SHORT_CONDUCTANCE
-            matrix[j][k] -= _SHORT_CONDUCTANCE
-            matrix[k][j] -= _SHORT_CONDUCTANCE
+        if second in _TERMINAL_NAMES:
+            join(matrix, j, _TERMINAL_NAMES.index(second), _SHORT_CONDUCTANCE)
+        else:
+            matrix[j][j] += _SHORT_CONDUCTANCE
+            sources[j] += 0.0 if second == "ground" else _SHORT_CONDUCTANCE * parts.supply_volts
     at = solve(matrix, sources)
     current = sum(
         (parts.supply_volts - at[k]) * feeds[k] for k, terminal in enumerate(terminals) if terminal == "supply"
@@ -167,6 +164,14 @@ def _phase(
     )
     seen = [at[k] * feeds[k] * loads[terminal] for k, terminal in enumerate(terminals)]
     return seen, current, at
+
+
+def join(matrix: list[list[float]], j: int, k: int, siemens: float) -> None:
+    """Add a conductance between two nodes to nodal equations [S]."""
+    matrix[j][j] += siemens
+    matrix[k][k] += siemens
+    matrix[j][k] -= siemens
+    matrix[k][j] -= siemens
 
 
 def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:

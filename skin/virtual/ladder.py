@@ -13,7 +13,7 @@ from itertools import pairwise
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 
-from .circuit import ContactModel, LayerContact, Matrix
+from .circuit import ContactModel, LayerContact, Matrix, join
 
 _A, _B, _C, _D = range(4)
 _MIN_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
@@ -59,21 +59,14 @@ class ResistorLadder:
             upper, lower = 4 + 2 * k, 5 + 2 * k
             along.append((1.0 - radial if sensor.b_positive else radial, upper))
             around.append((angular if sensor.c_positive else 1.0 - angular, lower))
-            _join(y, upper, lower, contact.conductance)
+            join(y, upper, lower, contact.conductance)
         for ladder, ohms in ((along, sensor.radial_ohms), (around, sensor.angular_ohms)):
             ladder.sort()
             for (start, j), (stop, k) in pairwise(ladder):
-                _join(y, j, k, 1.0 / (ohms * max(stop - start, _MIN_PART)))
+                join(y, j, k, 1.0 / (ohms * max(stop - start, _MIN_PART)))
         for node in range(size - 1, 3, -1):  # star-mesh: leave the inner nodes out one by one
             _eliminate(y, node)
         return tuple(tuple(row[:4]) for row in y[:4])
-
-
-def _join(y: list[list[float]], j: int, k: int, siemens: float) -> None:
-    y[j][j] += siemens
-    y[k][k] += siemens
-    y[j][k] -= siemens
-    y[k][j] -= siemens
 
 
 def _eliminate(y: list[list[float]], node: int) -> None:

@@ -16,7 +16,7 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, DrivenPotentials, Frame
 
-from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, measure
+from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, join, measure
 from .fault_injection import FaultInjection, FaultyLine
 from .imperfections import Imperfections
 from .ladder import RIGHT_WIRES, RewiredSheets
@@ -294,9 +294,7 @@ def _warmed(sheets: Matrix, sensor: Sensor, grown: tuple[float, float]) -> Matri
         return sheets
     rows = [list(row) for row in sheets]
     for first, ohms, ratio in ((0, sensor.radial_ohms, grown[0]), (2, sensor.angular_ohms, grown[1])):
-        lost = ratio / (1.0 + ratio) / ohms
-        for j, k, sign in ((0, 0, -1.0), (1, 1, -1.0), (0, 1, 1.0), (1, 0, 1.0)):
-            rows[first + j][first + k] += sign * lost
+        join(rows, first, first + 1, -ratio / (1.0 + ratio) / ohms)
     return tuple(tuple(row) for row in rows)
 
 

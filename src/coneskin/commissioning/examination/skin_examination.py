@@ -53,7 +53,7 @@ class SensorStatistics:
 
     def noise(self, channel: str) -> float:
         """Return the standard deviation of a reading [counts]."""
-        return statistics.pstdev(getattr(frame, channel) for frame in self.frames)
+        return float(statistics.pstdev(getattr(frame, channel) for frame in self.frames))
 
 
 class SkinStatistics:

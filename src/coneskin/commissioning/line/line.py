@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from coneskin.core.errors import SceneError, SkinConnectionError
@@ -34,7 +34,7 @@ class Line:
     source: Source | None = None
     path: Path | None = None
     recorded: bool = False
-    sensors: tuple[Sensor, ...] = field(default=())
+    sensors: tuple[Sensor, ...] = ()
     baud: int | None = None
 
     def pieces(self) -> Iterator[tuple[float, bytes]]:

@@ -92,7 +92,6 @@ class _BodyContact(NamedTuple):
     rate: float  #: its growth [m/s]
     force: float  #: [N]
     normal: Vector  #: outward unit normal of the skin, in the base frame
-    point: Vector  #: in the base frame [m]
 
 
 class Touch(NamedTuple):
@@ -394,8 +393,5 @@ class MujocoPlant:
 
     def _contact(self, touch: Touch) -> _BodyContact:
         u, phi, _ = self._locate(touch.sheet, touch.point)
-        px, py, pz = touch.point.tolist()
-        nx, ny, nz = touch.normal.tolist()
-        return _BodyContact(
-            touch.sheet, touch.part, u, phi, touch.depth, touch.rate, touch.force, (nx, ny, nz), (px, py, pz)
-        )
+        x, y, z = touch.normal.tolist()
+        return _BodyContact(touch.sheet, touch.part, u, phi, touch.depth, touch.rate, touch.force, (x, y, z))
