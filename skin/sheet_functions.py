@@ -109,21 +109,8 @@ class RobinFunction:
         self._powers = tuple(math.exp(-2.0 * n * self._sigma) for n in range(1, count + 1))
         self._inner = math.log(self._scale) + 2.0 * sum(math.log1p(-power) for power in self._powers)
 
-    def gradient(self, x: float, y: float) -> tuple[float, float]:
-        """Return its gradient [ohm/m] at a place of the rectangle [m], inside of it."""
-        s, p, flip_s, flip_p = self._quarter(x, y)
-        across, along = self._across, self._along
-        corner = self._slope(cmath.exp(complex(-2.0 * s, -2.0 * p)))
-        d_s = (across + along) * corner.real - 2.0 * along * s / self._sigma
-        d_p = -(across + along) * corner.imag
-        if across != along:
-            d_s -= (across - along) * self._slope(complex(math.exp(-2.0 * s))).real
-            d_p -= (across - along) * self._slope(cmath.exp(-2j * p)).imag
-        d_s, d_p = self._scale * (-d_s if flip_s else d_s), self._scale * (-d_p if flip_p else d_p)
-        return (d_s, d_p) if self._along_x else (d_p, d_s)
-
     def value_and_gradient(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return the function itself [ohm], distances measured in metres, and its gradient [ohm/m] along x and y."""
+        """Return the function [ohm], distances measured in metres, and its gradient [ohm/m], at a place inside [m]."""
         s, p, flip_s, flip_p = self._quarter(x, y)
         across, along = self._across, self._along
         corner, slope = self._logarithm(cmath.exp(complex(-2.0 * s, -2.0 * p)))
@@ -149,14 +136,6 @@ class RobinFunction:
         )
         flip_s, flip_p = s > 0.5 * s_side, p > 0.5 * p_side
         return self._scale * (s_side - s if flip_s else s), self._scale * (p_side - p if flip_p else p), flip_s, flip_p
-
-    def _slope(self, inverse: complex) -> complex:
-        """d ln theta(z)/dz at exp(-z)."""
-        total = 0.5 * (1.0 + inverse) / (1.0 - inverse)
-        for power in self._powers:
-            low, high = power * inverse, power / inverse
-            total += low / (1.0 - low) - high / (1.0 - high)
-        return total
 
     def _logarithm(self, inverse: complex) -> tuple[float, complex]:
         """ln |theta(z)| at exp(-z), and the slope of ln theta."""

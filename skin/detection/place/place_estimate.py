@@ -292,7 +292,7 @@ class PlaceEstimator:
             if again:
                 if size * size < noise_place:
                     break  # it changes by less than noise does
-                slope_x, slope_y = self._robin.gradient(x, y)
+                _, slope_x, slope_y = self._robin.value_and_gradient(x, y)
             move_x = 0.5 * (a_xx * slope_x + a_xy * slope_y) + taper * (2.0 * a_xx - a_yy)
             move_y = 0.5 * (a_xy * slope_x + a_yy * slope_y) + 3.0 * taper * a_xy
             most = _MAX_STEP * (length + breadth)

@@ -43,7 +43,6 @@ class CountedTouch:
         for kind, name in (
             (PlaceEstimator, "estimate"),
             (RobinFunction, "value_and_gradient"),
-            (RobinFunction, "gradient"),
         ):
             monkeypatch.setattr(kind, name, self._counted(name, getattr(kind, name)))
         for _ in range(LEARNED):
