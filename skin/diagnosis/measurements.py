@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from math import gcd
+from math import gcd, sqrt
 from statistics import median_high
 
 from coneskin.core.finding import Finding
@@ -210,7 +210,7 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
 def _measure_hum(columns: _Columns) -> float:
     """Return the amplitude of what swings on the untouched guides [counts]; they stand at 0, which cuts half of it."""
     squares = (sum(count * count for count in column) / len(column) for _, column in _untouched_guides(columns))
-    return 2.0 * max(squares, default=0.0) ** 0.5
+    return 2.0 * sqrt(max(squares, default=0.0))
 
 
 def _untouched_guides(columns: _Columns) -> Iterator[tuple[int, list[int]]]:
