@@ -182,10 +182,7 @@ class ForceTable:
         return value, self.error * value
 
     def level(self, force: float) -> float:
-        """Return the level that a force gives.
-
-        Args:
-            force: [N].
+        """Return the level that a force [N] gives.
 
         Raises:
             SensorError: it is lighter or firmer than all that were tried.

@@ -197,10 +197,7 @@ class FrameDecoder:
         return len(self._rest)
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Take the next bytes of the stream.
-
-        Args:
-            data: any number of bytes.
+        """Take the next bytes of the stream, any number of them.
 
         Returns:
             the frames that are complete now, in their order.

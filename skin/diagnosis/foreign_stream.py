@@ -175,13 +175,7 @@ _MODBUS_POLYNOMIAL = 0x8005  # polynomial
 
 
 def find_constant(data: bytes, rate: float, baud: int | None) -> Finding | None:
-    """Find a line on which one byte comes over and over.
-
-    Args:
-        data: the bytes.
-        rate: at which they come [1/s]; infinite where that is not known.
-        baud: of the port, or None.
-    """
+    """Find a line on which one byte comes over and over, at a rate [1/s]; infinite where that is not known."""
     byte, count = Counter(data).most_common(1)[0]
     if count < 0.99 * len(data) or len(data) < 16:
         return None

@@ -90,13 +90,7 @@ def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
 
 
 def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors: int) -> Finding | None:
-    """Say what is wrong with sequence and clock of the frames of one sensor.
-
-    Args:
-        frames: of one sensor, in their order.
-        times: when each came, host clock [s].
-        sensors: number of sensors that send on this line.
-    """
+    """Say what is wrong with sequence and clock of the frames of one sensor, of so many that send on this line."""
     if len(frames) < _MIN_FRAMES:
         return None
     numbers = measure_numbers(frames, times)

@@ -83,12 +83,7 @@ def find_status(frames: Sequence[Frame]) -> Finding | None:
 
 
 def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> Finding | None:
-    """Say what is wrong with the measurements of one sensor.
-
-    Args:
-        frames: of one sensor, in their order.
-        sensor: as its scene has it; None where there is no scene.
-    """
+    """Say what is wrong with the measurements of one sensor, or of one without a scene."""
     if len(frames) < _MIN_FRAMES:
         return None
     columns = list(zip(*map(_measured, frames), strict=True))
@@ -189,12 +184,7 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Finding | None:
 
 
 def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
-    """Return what is remarkable though a guard takes it, drive currents off the design's and hum; a few words each.
-
-    Args:
-        frames: of the sensor, in their order.
-        sensor: as its scene has it.
-    """
+    """Return what is remarkable though a guard takes it, drive currents off the design's and hum; a few words each."""
     columns, expected = list(zip(*map(_measured, frames), strict=True)), expected_counts(sensor)
     found = []
     for name, k in (("radial", _RADIAL_AT), ("angular", _ANGULAR_AT)):

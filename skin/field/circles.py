@@ -254,12 +254,9 @@ def make_circles(
 
 
 def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex, Floats]:
-    """Return offsets in the rectangle from the centres to points zeta of the rims, and |d offset / d zeta| [m].
+    """Return offsets in the rectangle from the centres to points of the rims, and |d offset / d zeta| [m].
 
-    Args:
-        sheet: the sheet.
-        discs: n scenes of k discs.
-        zeta: on the unit circle, shape (N,) or (n, k, N).
+    The points zeta are on the unit circle, shape (N,) or (n, k, N).
     """
     local = discs.radius / sheet.stretch(discs.u)  # a/h, the radius in the rectangle
     if sheet.curvature == 0.0:

@@ -53,10 +53,7 @@ class Source(Openable, Protocol):
         """Return the descriptor that becomes readable when bytes arrive, or None where there is none."""
 
     def read(self, timeout: float) -> bytes:
-        """Wait for bytes.
-
-        Args:
-            timeout: longest time to wait [s].
+        """Wait for bytes, for a time at most [s].
 
         Returns:
             what has arrived, at least one byte, never more than a few kilobytes.

@@ -100,13 +100,7 @@ def draw_flaws(tolerance: SheetTolerance, seed: int) -> tuple[SheetFlaws, SheetF
 
 
 class _Sheet:
-    """One sheet with its two electrodes, x along its field.
-
-    Args:
-        flaws: of it.
-        size: from electrode to electrode, and across [m].
-        ohms: per square.
-    """
+    """One sheet with its two electrodes, x along its field; its size is from electrode to electrode, and across [m]."""
 
     def __init__(self, flaws: SheetFlaws, size: tuple[float, float], ohms: float) -> None:
         from scipy.sparse import coo_matrix
@@ -229,12 +223,7 @@ class _Pair:
 
 
 class BuiltSheets:
-    """Contact model of sheets as they are built.
-
-    Args:
-        flaws: of the upper and of the lower sheet.
-        exact: model of the ideal sheets.
-    """
+    """Contact model of an upper and a lower sheet as they are built, beside the exact one of ideal sheets."""
 
     def __init__(self, flaws: tuple[SheetFlaws, SheetFlaws], exact: ContactModel) -> None:
         self._exact = exact

@@ -175,15 +175,7 @@ def join(matrix: list[list[float]], j: int, k: int, siemens: float) -> None:
 
 
 def solve(matrix: list[list[float]], right: Iterable[float]) -> list[float]:
-    """Solve a small system of nodal equations (diagonally dominant, so without pivoting).
-
-    Args:
-        matrix: n rows of n numbers; overwritten.
-        right: n numbers.
-
-    Returns:
-        the n unknowns.
-    """
+    """Solve a small system of nodal equations (diagonally dominant, so without pivoting); the matrix is overwritten."""
     x = list(right)
     n = len(x)
     for k in range(n):

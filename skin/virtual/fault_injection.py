@@ -109,12 +109,7 @@ _INPUT_READINGS = {
 
 
 class FaultyLine:
-    """The line from the device to the reader: frames in, the bytes that arrive out.
-
-    Args:
-        faults: what goes wrong.
-        seed: of the random damage.
-    """
+    """The line from the device to the reader: frames in, the bytes that arrive out; the seed is of random damage."""
 
     def __init__(self, faults: FaultInjection, seed: int = 0) -> None:
         self.faults = faults

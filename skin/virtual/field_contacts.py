@@ -54,13 +54,7 @@ class _FixedDiscs:
 
     @classmethod
     def of(cls, model: FieldModel, u: ArrayLike, phi: ArrayLike, largest: ArrayLike) -> _FixedDiscs:
-        """Prepare the places.
-
-        Args:
-            model: the sheet and its resistances.
-            u: slant distance of the middles from end 1 [m], shape (k,).
-            phi: their azimuth [rad], shape (k,).
-            largest: radius up to which each contact may grow [m], shape (k,).
+        """Prepare places u [m] and phi [rad] of contacts that may grow up to the largest radii [m], each of shape (k,).
 
         Raises:
             FieldError: a disc of the largest radius cuts an edge or overlaps another, or the tolerance cannot be met.
@@ -237,11 +231,7 @@ def _within(value: float, end: float) -> float:
 
 
 def _cut(distance: float) -> tuple[float, float]:
-    """Return what a straight edge leaves of the unit disc: part of its area, and offset of its centroid.
-
-    Args:
-        distance: of the edge from the middle.
-    """
+    """Return what an edge at a distance leaves of the unit disc: part of its area, and offset of its centroid."""
     if distance >= 1.0:
         return 1.0, 0.0
     sine = math.sqrt(1.0 - distance * distance)

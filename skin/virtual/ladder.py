@@ -30,14 +30,7 @@ class ResistorLadder:
         """Do nothing: nothing takes long here."""
 
     def admittance(self, sensor: Sensor, contacts: Sequence[LayerContact]) -> Matrix:
-        """Return the 4 x 4 matrix Y [S] in the order A, B, C, D.
-
-        Args:
-            sensor: the sheets.
-            contacts: any number of them.
-
-        Returns:
-            a symmetric matrix whose rows sum to zero.
+        """Return the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
 
         Raises:
             SensorError: a contact lies off the sensor, or its conductance is negative.
@@ -99,12 +92,7 @@ def reorder(sheets: Matrix, order: Sequence[int]) -> Matrix:
 
 
 class RewiredSheets:
-    """Contact model whose electrodes are on other terminals.
-
-    Args:
-        model: of the sheets.
-        wires: as in ``wire_order``.
-    """
+    """Contact model whose electrodes are on other terminals, by wires as in ``wire_order``."""
 
     def __init__(self, model: ContactModel, wires: str) -> None:
         self._model = model

@@ -212,12 +212,7 @@ def wait_for_reader(master: int, path: str, wait: Callable[[float], bool]) -> in
 
 
 def drain(slave: int | None, wait: Callable[[float], bool]) -> None:
-    """Let the reader take what is on its way, for a second at most: a hang-up would throw it away.
-
-    Args:
-        slave: the reader's end.
-        wait: lets so many seconds pass; True if the waiting shall stop.
-    """
+    """Let the reader take what is on its way to its end, for a second at most: a hang-up would throw it away."""
     import fcntl
     import termios
 

@@ -217,34 +217,17 @@ def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[floa
 
 
 def palm_over_seam(cone: Frustum, touch: ScriptedTouch, angle: float) -> list[ScriptedTouch]:
-    """Press on both sides of the seam at equal u, as a palm does that lies over it.
-
-    Args:
-        cone: the active area.
-        touch: when, where along the side, how firmly on each side; its phi is not used.
-        angle: of each press from its edge of the sensor [rad].
-    """
+    """Press on both sides of the seam at equal u, at an angle from each edge [rad], as a palm that lies over it."""
     return _at(cone, touch, [(touch.u, angle), (touch.u, cone.wrap - angle)])
 
 
 def grip(cone: Frustum, touch: ScriptedTouch) -> list[ScriptedTouch]:
-    """Press on opposite sides at equal u, as a hand does that closes around the link.
-
-    Args:
-        cone: the active area.
-        touch: the first press.
-    """
+    """Press on the opposite side at equal u as well, as a hand does that closes around the link."""
     return _at(cone, touch, [(touch.u, touch.phi), (touch.u, (touch.phi + math.pi) % (2.0 * math.pi))])
 
 
 def fingers(cone: Frustum, touch: ScriptedTouch, offsets: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:
-    """Press with several fingers around a place.
-
-    Args:
-        cone: the active area.
-        touch: when, around which place, and how firmly each.
-        offsets: of each finger along the side and around it [m].
-    """
+    """Press with several fingers around a place, each at an offset along the side and around it [m]."""
     radius = cone.radius_at(touch.u)
     return _at(cone, touch, [(touch.u + along, touch.phi + around / radius) for along, around in offsets])
 

@@ -91,10 +91,7 @@ class SkinWatch:
         return said and f"{said}: the inputs contradict each other while it is touched; check their gains and wires"
 
     def read(self, timeout: float) -> dict[str, TouchReading | None]:
-        """Wait for bytes, and return what each sensor reads, by its name; None where it is not touched.
-
-        Args:
-            timeout: longest time to wait [s].
+        """Wait for bytes, for a time at most [s], and return what each sensor reads by its name; None where untouched.
 
         Raises:
             SkinError: a sensor has a fault, or is silent; a place that it read would say nothing.

@@ -71,11 +71,7 @@ class Mark:
 
 
 class _Samples:
-    """Newest samples of a touch.
-
-    Args:
-        longest: time for which they are kept [s].
-    """
+    """Newest samples of a touch, which are kept for a time [s]."""
 
     def __init__(self, longest: float) -> None:
         self._longest = longest
@@ -169,11 +165,7 @@ class TouchJudge(Generic[Reading]):
 
 
 class Touching(Generic[Reading]):
-    """Touching of one mark after the other.
-
-    Args:
-        judge: of the touches.
-    """
+    """Touching of one mark after the other, as a judge asks for them."""
 
     def __init__(self, judge: TouchJudge[Reading]) -> None:
         self.judge = judge

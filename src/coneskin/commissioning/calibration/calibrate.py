@@ -61,12 +61,7 @@ _SIZE_TOLERANCE = 1e-3  # mm or deg; design.json is rounded
 
 
 def _printed_marks(sensor: Sensor, sheet: Mapping[str, Any]) -> tuple[Mark, ...]:
-    """Return the marks that are printed on the cover of a sensor; none where it is not of that design.
-
-    Args:
-        sensor: that is calibrated.
-        sheet: the table of its sheet in design.json.
-    """
+    """Return the marks that are printed on the cover of a sensor; none where its sheet in design.json is another."""
     cone, drawn = sensor.frustum, sheet.get("active_cone", {})
     own = {key.name: key.in_file_unit(getattr(cone, key.plain)) for key in CONE_KEYS}
     if any(abs(drawn.get(name, math.inf) - value) > _SIZE_TOLERANCE for name, value in own.items()):
@@ -151,10 +146,7 @@ class Calibrator:
         self._pressed = [SensorPresses(item.sensor, _pressed_marks(item.marks)) for item in self.sensors]
 
     def run(self, by: str = "") -> list[CalibrationResult]:
-        """Carry it out.
-
-        Args:
-            by: who touches.
+        """Carry it out, with the name of who touches.
 
         Returns:
             the result of each sensor; no file is written.

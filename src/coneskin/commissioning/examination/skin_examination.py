@@ -57,10 +57,7 @@ class SensorStatistics:
 
 
 class SkinStatistics:
-    """Everything that came from one source.
-
-    Args:
-        start: when the listening began [s].
+    """Everything that came from one source since the listening began [s].
 
     Attributes:
         received: bytes.

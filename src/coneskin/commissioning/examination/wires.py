@@ -76,12 +76,7 @@ def touch_places(sensor: Sensor) -> dict[str, tuple[float, float]]:
 
 
 def _identify(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> _WireVerdict:
-    """Find the order of the wires.
-
-    Args:
-        sensor: as the scene describes it.
-        touched: readings of the touches near A, B, C, D, as of ``touch_places``.
-    """
+    """Find the order of the wires by the readings of the touches, as of ``touch_places``."""
     touches = [_Touch(sensor, place, touched[name]) for name, place in touch_places(sensor).items()]
     rough = {wiring: sum(touch.rough(wiring) for touch in touches) for wiring in WIRINGS}
     near = sorted(rough, key=rough.__getitem__)[:_REFINED_WIRINGS]
@@ -175,11 +170,7 @@ def touch_words(sensor: Sensor, electrode: str) -> str:
 
 
 def examine_wires(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> tuple[Finding, WirePatch | None]:
-    """Find exchanged wires.
-
-    Args:
-        sensor: as the scene describes it.
-        touched: readings of the touches near A, B, C and D.
+    """Find exchanged wires by the readings of the touches near A, B, C and D.
 
     Returns:
         the finding, and what in the scene would mend it; None where nothing is wrong, or the wires must be moved.

@@ -12,10 +12,7 @@ _BY_ID = Path("/dev/serial/by-id")
 
 
 class PortSearch:
-    """Search of one port.
-
-    Args:
-        present: ports that are there at the beginning.
+    """Search of one port, which begins with the ports that are there.
 
     Attributes:
         found: the port, once it is known.

@@ -115,10 +115,8 @@ def _worst_lag(levers: Floats, masses: Floats) -> Floats:
 def _worst_bend(changes: Floats) -> Floats:
     """Return a bound of the bend of patches in any direction [m/rad^2], shape (patches,).
 
-    Without what is below 0 on its diagonal, a form is convex in each joint, so that a corner has the most.
-
-    Args:
-        changes: symmetric, shape (patches, joints, joints) [m/rad^2].
+    Without what is below 0 on its diagonal, a form is convex in each joint, so that a corner has the most. The changes
+    are symmetric, shape (patches, joints, joints) [m/rad^2].
     """
     import numpy as np
 

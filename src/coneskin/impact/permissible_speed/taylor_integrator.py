@@ -37,9 +37,7 @@ _SERIES_SHARE = 0.1  # of the tolerance, for the last coefficients of a step ove
 def expand(model: TwoMassContact, start: ContactState) -> tuple[list[float], ...]:
     """Return the coefficients of compression [m], rate [m/s], place [m], speed [m/s] and force [N], lowest power first.
 
-    Args:
-        model: of the contact.
-        start: state around which they are taken; without a slope of the force there is no contact.
+    They are taken around a state; without a slope of the force there is no contact in it.
     """
     arm, body = model.arm, model.body
     m1, m2, k2, c2 = 1.0 / arm.mass, 1.0 / body.mass, body.support, body.damping  # 0 of an infinite mass
@@ -105,13 +103,7 @@ class _Collocation:
 
 
 def _collocate(model: TwoMassContact, start: ContactState, length: float) -> _Collocation | None:
-    """Return the step of a length [s], in contact throughout; None where Newton's method finds none.
-
-    Args:
-        model: of the contact.
-        start: state at the beginning, with padding and body touching.
-        length: of the step [s].
-    """
+    """Return the step of a length [s], in contact throughout; None where Newton's method finds none."""
     import numpy as np
 
     arm, body, loss = model.arm, model.body, model.law.loss

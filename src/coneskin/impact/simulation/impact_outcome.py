@@ -23,11 +23,7 @@ _MIN_BODY_MOTION = 1e-4  # m by which a body that nothing touches must have move
 
 
 class TruthRecorder:
-    """Recorder that makes a block of what has changed, at a bounded rate.
-
-    Args:
-        period: least time from one block to the next while a force only changes [s].
-    """
+    """Recorder that makes a block of what has changed, at most one in a period [s] while a force only changes."""
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -74,11 +70,9 @@ class TouchRecorder:
         self._silent = True
 
     def feed(self, time: float, presses: Iterable[Press]) -> Block | None:
-        """Return the block of what has begun or ended; None where nothing has. The first one is always there.
+        """Return the block of what has begun or ended by a time of the host [s]; None where nothing has.
 
-        Args:
-            time: host clock [s].
-            presses: that there are now.
+        The first one is always there.
         """
         sums: dict[str, float] = {}
         strongest: dict[str, Press] = {}
