@@ -17,6 +17,7 @@ the distance is |1 + alpha zeta + beta zeta'|: the same with zeta' for zeta'* an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -273,9 +274,11 @@ def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex
 
 
 def pair_points(
-    strip: Strip, centres: Centres, offsets: Complex, i: int, j: int, equal: bool
+    strip: Strip, centres: Centres, offsets: Sequence[Complex], i: int, j: int, equal: bool
 ) -> tuple[StripPoints, StripPoints, Floats, Floats, Floats]:
     """Return the points of discs i and j, mirrored to the near corner, and the linear part of the Green function.
+
+    The offsets are those of the points of each disc from its centre, unmirrored, shape (n, N) each.
 
     That part is s_lo (Sigma - s_hi) / Sigma + (s_hi - s_ref) with s_ref the higher centre. Returned are its weights
     on the offsets of i and of j and its value at the centres, so that a long strip loses nothing by that large
@@ -290,7 +293,7 @@ def pair_points(
     high, low, p_ref = np.where(i_high, s[0], s[1]), np.where(i_high, s[1], s[0]), np.where(i_high, p[0], p[1])
     made = []
     for place, d in enumerate((i,) if i == j else (i, j)):
-        offset = mirrored(offsets[:, d], strip.along_x, flip_s, flip_p)
+        offset = mirrored(offsets[d], strip.along_x, flip_s, flip_p)
         made.append(direct_features(strip, offset, s[place], p[place], high, p_ref, equal))
     above = np.where(i_high, rest[0], rest[1])
     weight_high, weight_low = 1.0 - low / strip.sigma, above / strip.sigma
@@ -311,7 +314,7 @@ def green_block(
     """
     _, squared, fourier = circle(circles.order, circles.offset.shape[2])
     first, second, weight_i, weight_j, centre = pair_points(
-        strip, circles.centres, circles.offset, i, j, resistance_a == resistance_b
+        strip, circles.centres, circles.offset.swapaxes(0, 1), i, j, resistance_a == resistance_b
     )
     if i == j:
         slope = circles.slope[:, i] * np.abs(1.0 + first.direct)

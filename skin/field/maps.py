@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike
 from coneskin.core.arrays import Complex, Floats
 from coneskin.core.errors import FieldError
 
-from .circles import Circles, circle, make_circles
+from .circles import Centres, Circles, circle, make_circles, pair_points
 from .disc import Disc, Discs, bessel_ratios, check_discs
 from .fourport import DrivePhase, angular_phase, radial_phase
-from .green import Strip, direct_features, kernel, mirrored
+from .green import Strip, kernel
 from .model import FieldModel
 from .multipole import resolution, solve_to_tolerance
 
@@ -136,27 +136,19 @@ class FieldMap:
     ) -> tuple[Floats, Floats]:
         """Sum both Green functions without -ln|z - z'| / 2 pi over the charges on the circle, at points."""
         sheet = self.model.sheet
-        k = strip.scale
-        x, y = sheet.along(u)[0], sheet.across(phi)[0]
-        s, p = (x, y) if strip.along_x else (y, x)
-        near_s, far_s, near_p, far_p = (distance[:, 0] for distance in source.centres)
-        flip_s, flip_p = near_s > far_s, near_p > far_p
-        s0, p0 = np.where(flip_s, far_s, near_s), np.where(flip_p, far_p, near_p)
-        s_all = np.where(flip_s, strip.sigma - k * s, k * s)
-        p_all = np.where(flip_p, math.pi - k * p, k * p)
-        offset = np.asarray((s_all - s0 + 1j * (p_all - p0))[None], dtype=np.complex128)
-        field = direct_features(strip, offset, s0, p0, s0, p0, equal=False)
-        points = direct_features(
-            strip, mirrored(source.offset[:, 0], strip.along_x, flip_s, flip_p), s0, p0, s0, p0, equal=False
-        )
+        place = sheet.along(u)[0] + 1j * sheet.across(phi)[0]
+        s, p = source.centres.s[0, 0], source.centres.p[0, 0]
+        offset = strip.scale * place - (s + 1j * p if strip.along_x else p + 1j * s)
+        both = Centres(*(np.repeat(distance, 2, axis=1) for distance in source.centres))
+        field, points, weight, _, centre = pair_points(strip, both, (offset[None], source.offset[:, 0]), 0, 1, False)
         squared = np.abs(flat[:, None] - zeta[None, :]) ** 2
         floor = 1e-24  # of a point upon a node, where both distances vanish together
         out = []
         for a, b in ((1.0, 0.0), (0.0, 1.0)):
             values = kernel(strip, field, points, a, b, np.maximum(squared, floor), None)[0]
             if b:
-                there, here = s0[0] + points.s[0][None, :], s_all[:, None]
-                values = values + (here + points.s[0][None, :] - here * there / strip.sigma) / math.pi
+                here, there = field.s[0][:, None], points.s[0][None, :]
+                values = values + (weight * (here + there) - here * there / strip.sigma + centre) / math.pi
             out.append(values @ charges)
         return out[0], out[1]
 

@@ -190,7 +190,7 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
     if n * k > _MAX_POINTS:
         return None
     weights = _log_weights(n)
-    matrix, charges, wanted = np.empty((k, n, k, n)), [], np.empty((k, n, 3))
+    matrix, charges, wanted = np.zeros((k, n, k, n)), [], np.empty((k, n, 3))
     x, y = sheet.along(discs.u)[0][0] / sheet.length, sheet.across(discs.phi)[0][0] / sheet.breadth
     offset = points.offset[0] / strip.scale
     for i in range(k):
@@ -200,8 +200,7 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
         wanted[i, :, 0] = 1.0
         wanted[i, :, 1] = x[i] - x.mean() + offset[i].real / sheet.length
         wanted[i, :, 2] = y[i] - y.mean() + offset[i].imag / sheet.breadth
-        for j in range(k):
-            matrix[i, :, j, :] = layer if i == j else 0.0
+        matrix[i, :, i, :] = layer
     a, b = (lower, upper) if strip.along_x else (upper, lower)
     for i in range(k):
         for j in range(k):
@@ -217,7 +216,9 @@ def _solve(sheet: SectorSheet, upper: float, lower: float, discs: Discs, density
 def _green(strip: Strip, points: _RimPoints, i: int, j: int, a: float, b: float, weights: Floats) -> Floats:
     """Return Ra G_a + Rb G_b from the charge of each point of disc j to each point of disc i, shape (N, N)."""
     n = points.t.size
-    first, second, weight_i, weight_j, centre = pair_points(strip, points.centres, points.offset, i, j, a == b)
+    first, second, weight_i, weight_j, centre = pair_points(
+        strip, points.centres, points.offset.swapaxes(0, 1), i, j, a == b
+    )
     if i == j:
         slope = points.slope[:, i] * np.abs(1.0 + first.direct)
         lag = _lag(points.t)

@@ -112,11 +112,6 @@ class SectorSheet:
         """Side T of the rectangle between the straight edges C and D [m]."""
         return self.arc
 
-    @property
-    def area(self) -> float:
-        """Area of the sheet [m^2]."""
-        return self.arc * self.width * (1.0 + 0.5 * self.curvature * self.width)
-
     def stretch(self, u: ArrayLike) -> Floats:
         """Return the flat length per length in the rectangle, r/r1, at slant distance u."""
         return 1.0 + self.curvature * np.asarray(u, dtype=np.float64)
