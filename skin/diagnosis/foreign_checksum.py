@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import reduce
 from itertools import product
 from operator import xor
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from coneskin.core.finding import Finding
 
@@ -143,22 +143,14 @@ def _find_crc(frames: Sequence[tuple[bytes, bytes]]) -> Finding | None:
                 break
         if orders:
             order: Literal["big", "little"] = "big" if "big" in orders else "little"
-            return _describe(body0, tail0, _Found(polynomial, bool(padded), reflected, order))
+            return _describe(body0, tail0, polynomial, len(padded), reflected, order)
     return None
 
 
-class _Found(NamedTuple):
-    """Parameters that differences of frames show."""
-
-    polynomial: int
-    padded: bool  # taken over two zeros behind the message as well
-    reflected: bool
-    order: Literal["big", "little"]
-
-
-def _describe(body: bytes, tail: bytes, found: _Found) -> Finding:
-    """Name every parameter that differs from CRC-16/XMODEM, the gravest first."""
-    polynomial, padded, reflected, order = found
+def _describe(
+    body: bytes, tail: bytes, polynomial: int, zeros: int, reflected: bool, order: Literal["big", "little"]
+) -> Finding:
+    """Name every parameter that differs from CRC-16/XMODEM, the gravest first; zeros are taken behind the message."""
     seen: list[tuple[Cause, str]] = []
     if polynomial != _RIGHT_POLYNOMIAL:
         seen.append(
@@ -166,9 +158,9 @@ def _describe(body: bytes, tail: bytes, found: _Found) -> Finding:
         )
     if reflected:
         seen.append((Cause.CRC_REFLECTED, "its bits are reflected (as KERMIT, X-25 and MODBUS have them)"))
-    if padded:
+    if zeros:
         seen.append((Cause.CRC_RANGE, "it was taken over its own two bytes as well, while they were 0"))
-    start, value, inverted = _find_start(body + bytes(2 * padded), int.from_bytes(tail, order), polynomial, reflected)
+    start, value, inverted = _find_start(body + bytes(zeros), int.from_bytes(tail, order), polynomial, reflected)
     if start:
         seen.append((Cause.CRC_RANGE, _RANGE_WORDS[start]))
     if value is None:
