@@ -274,7 +274,7 @@ def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex
 
 
 def pair_points(
-    strip: Strip, centres: Centres, offsets: Sequence[Complex], i: int, j: int, equal: bool
+    strip: Strip, centres: Centres, offsets: Sequence[Complex] | Complex, i: int, j: int, equal: bool
 ) -> tuple[StripPoints, StripPoints, Floats, Floats, Floats]:
     """Return the points of discs i and j, mirrored to the near corner, and the linear part of the Green function.
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from coneskin.core.errors import SensorError, SkinConnectionError
+from coneskin.core.files import explain_os_error
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
@@ -232,16 +233,13 @@ def _argument(parse: Any) -> Any:
 def _write_file(skin: VirtualSkin, output: str, as_json: bool) -> int:
     if not (math.isfinite(skin.duration) or skin.faults.unplug_after is not None):
         raise SensorError("--output needs a stream that ends: give --duration-s")
-    count = 0
-    try:
+    with explain_os_error(SkinConnectionError, f"{output} cannot be written"):
         if output == "-":
             count = _write_packets(skin, sys.stdout.buffer)
             sys.stdout.buffer.flush()
         else:
             with _open_output(Path(output)) as file:
                 count = _write_packets(skin, file)
-    except OSError as error:
-        raise SkinConnectionError(f"{output}: cannot be written ({error.strerror or error})") from error
     if output != "-":
         _say(as_json, {"output": output, "bytes": count}, f"wrote {count} bytes to {output}")
     return 0
@@ -281,12 +279,10 @@ def _linked(path: str, link: str | None) -> Iterator[None]:
         yield
         return
     place = Path(link)
-    try:
+    with explain_os_error(SkinConnectionError, f"{link} cannot be made a link to {path}"):
         if place.is_symlink():
             place.unlink()
         place.symlink_to(path)
-    except OSError as error:
-        raise SkinConnectionError(f"{link}: cannot be made a link to {path} ({error.strerror or error})") from error
     try:
         yield
     finally:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coneskin.core.errors import SceneError, SkinConnectionError
-from coneskin.core.files import read_file
+from coneskin.core.files import explain_os_error, read_file
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.kinds import open_source
 from coneskin.skin.sources.source import Source
@@ -53,10 +53,8 @@ class Line:
             for block in recording.select(kinds=frozenset({BlockKind.SKIN})):
                 yield block.time, block.payload
             return
-        try:
+        with explain_os_error(SkinConnectionError, f"{self.path} cannot be read"):
             data = read_file(self.path, _MAX_SIZE)
-        except OSError as error:
-            raise SkinConnectionError(f"{self.path}: cannot be read ({error.strerror or error})") from error
         for at in range(0, len(data), _PIECE_SIZE):
             yield 0.0, data[at : at + _PIECE_SIZE]
 

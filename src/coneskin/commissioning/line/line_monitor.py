@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from coneskin.core.finding import Finding
-from coneskin.core.text import printable
+from coneskin.core.text import finite, printable
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.diagnosis.capture import CaptureWindow, find_frames
 from coneskin.skin.diagnosis.cause import Cause
@@ -243,16 +243,17 @@ def describe_line(report: LineReport, with_diagnosis: bool = True) -> str:
 def describe_report(report: LineReport) -> dict[str, Any]:
     """Return a report as JSON has it; nan becomes null."""
     named = report.diagnosis
-    return {
+    values = {
         "diagnosis": {"cause": named.item, "what": named.value, "do": named.remedy or Cause.NONE.value},
         "good": named.verdict == "ok",
         "time_s": round(report.time, 3),
         "bytes": report.size,
-        "bytes_per_s": _finite(report.byte_rate),
+        "bytes_per_s": round(report.byte_rate, 6),
         "bytes_skipped": report.skipped,
         "crc_errors": report.crc_errors,
         "sensors": [_sensor_object(sensor) for sensor in report.sensors],
     }
+    return dict(finite(values))
 
 
 def _sensor_object(sensor: _SensorReport) -> dict[str, Any]:
@@ -260,8 +261,8 @@ def _sensor_object(sensor: _SensorReport) -> dict[str, Any]:
         "name": sensor.name,
         "frames": sensor.frames,
         "missing": sensor.missing,
-        "rate_hz": _finite(sensor.numbers.rate),
-        "clock_ratio": _finite(sensor.numbers.clock_ratio),
+        "rate_hz": round(sensor.numbers.rate, 6),
+        "clock_ratio": round(sensor.numbers.clock_ratio, 6),
         "counts": sensor.counts,
         "expected": sensor.expected,
         "level": round(sensor.level, 4),
@@ -271,10 +272,6 @@ def _sensor_object(sensor: _SensorReport) -> dict[str, Any]:
         "health": sensor.health,
         "frame": sensor.raw.hex(),
     }
-
-
-def _finite(value: float) -> float | None:
-    return round(value, 6) if math.isfinite(value) else None
 
 
 def _number(value: float, digits: int) -> str:

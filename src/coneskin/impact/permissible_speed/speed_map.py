@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError
-from coneskin.core.files import write_whole
+from coneskin.core.files import explain_os_error, write_whole
 from coneskin.core.version import __version__
 from coneskin.robot.arm.kinematics import link_index
 from coneskin.robot.arm.models import arm_model
@@ -382,7 +382,5 @@ def write_map(found: SpeedMap, path: Path) -> None:
     """
     import tomli_w
 
-    try:
+    with explain_os_error(lambda why: SceneError([why], path.name), f"the speeds {path} cannot be written"):
         write_whole(path, _FILE_HEADER + tomli_w.dumps(map_table(found)))
-    except OSError as exc:
-        raise SceneError([f"the speeds {path} cannot be written: {exc.strerror or exc}"], path.name) from exc
