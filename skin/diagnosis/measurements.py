@@ -176,10 +176,8 @@ def _find_unexpected(columns: _Columns, sensor: Sensor) -> Finding | None:
     limits = sensor.thresholds
     for name, part, k in (("radial", radial, _RADIAL_AT), ("angular", angular, _ANGULAR_AT)):
         if not limits.current_low <= part <= limits.current_high:
-            what = (
-                f"the drive current of the {name} phase reads {middles[k]:.0f} counts, the scene expects {expected[k]}"
-            )
-            return Cause.CURRENT_OFF.found(what)
+            what = f"the drive current of the {name} phase reads {middles[k]:.0f} counts"
+            return Cause.CURRENT_OFF.found(f"{what}, the scene expects {expected[k]}")
     return None
 
 

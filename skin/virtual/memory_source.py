@@ -88,10 +88,8 @@ class MemorySource(Source):
             try:
                 due, data = next(self._packets)
                 self._next = (self._start + due, data)
-            except StopIteration:
-                self._gone = SkinConnectionError(f"{self.name} is gone: its time of {self._skin.duration:g} s is over")
-                self._next = (self.clock(), b"")
-            except SkinConnectionError as error:
-                self._gone = SkinConnectionError(f"{self.name} is gone: {error}")
+            except (StopIteration, SkinConnectionError) as error:
+                why = f"its time of {self._skin.duration:g} s is over" if isinstance(error, StopIteration) else error
+                self._gone = SkinConnectionError(f"{self.name} is gone: {why}")
                 self._next = (self.clock(), b"")
         return self._next

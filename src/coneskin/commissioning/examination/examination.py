@@ -113,12 +113,8 @@ class Doctor:
         scene, source = self.scene, self.scene.source
         if source is None or not scene.sensors:
             if scene.arm is None:  # there is nothing to examine at all
-                self.note(
-                    *(
-                        Finding("scene", "bad", line, "", "add it, or see coneskin init")
-                        for line in missing_parts(scene)
-                    )
-                )
+                remedy = "add it, or see coneskin init"
+                self.note(*(Finding("scene", "bad", line, "", remedy) for line in missing_parts(scene)))
             self.note(Finding("skin", "not tried", "the scene has no [source], or no sensor"))
             return
         self.note(*_port(source))

@@ -172,9 +172,8 @@ def examine_touches(sensor: Sensor, untouched: Sequence[Frame], touched: Sequenc
         if reading.matrix is not None and reading.level >= sensor.thresholds.location_level:
             found.append(test.deviation(reading.matrix) ** 2)
     if len(found) < _MIN_FRAMES:
-        return Finding(
-            item, "not tried", f"{len(found)} frames were touched firmly enough for a place", "", "press harder"
-        )
+        value = f"{len(found)} frames were touched firmly enough for a place"
+        return Finding(item, "not tried", value, "", "press harder")
     middle = statistics.median(found)
     verdict: Verdict = "ok" if middle <= _GOOD_PART else "warning" if middle <= 1.0 else "bad"
     remedy = (

@@ -116,19 +116,12 @@ def examine_line(
     expected = {(sensor.device_id, sensor.sensor_id) for sensor in sensors}
     for device, number in sorted(expected - seen.sensors.keys()):
         there = ", ".join(f"{d}/{s}" for d, s in sorted(seen.sensors)) or "none"
-        found.append(
-            Finding(
-                f"sensor {device}/{number}",
-                "bad",
-                f"it sends nothing; there are {there} (device/sensor)",
-                "each sensor of the scene sends",
-                "correct `device` and `id` of the sensor in the scene, or the numbers in the firmware",
-            )
-        )
+        value, rule = f"it sends nothing; there are {there} (device/sensor)", "each sensor of the scene sends"
+        remedy = "correct `device` and `id` of the sensor in the scene, or the numbers in the firmware"
+        found.append(Finding(f"sensor {device}/{number}", "bad", value, rule, remedy))
     for device, number in sorted(seen.sensors.keys() - expected):
-        found.append(
-            Finding(f"sensor {device}/{number}", "warning", "it sends, and the scene does not know it", "", "add it")
-        )
+        value = "it sends, and the scene does not know it"
+        found.append(Finding(f"sensor {device}/{number}", "warning", value, "", "add it"))
     if baud is not None and expected & seen.sensors.keys():
         rates = [one.numbers().rate for one in seen.sensors.values()]
         rate = sum(one for one in rates if math.isfinite(one))
@@ -192,10 +185,8 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     found.append(judged(f"{name}, guides", part <= _GUIDE_NOISE, value, "untouched: at most 1 %", remedy))
     status = seen.status & _STATUS_FAULTS
     if status:
-        names = ", ".join(bit.name or str(bit.value) for bit in Status if bit & status)
-        found.append(
-            Finding(f"{name}, status", "bad", f"the device reports {names}", "none", "docs/look-up/wire-format.md")
-        )
+        value = f"the device reports {', '.join(bit.name or str(bit.value) for bit in Status if bit & status)}"
+        found.append(Finding(f"{name}, status", "bad", value, "none", "docs/look-up/wire-format.md"))
     return found
 
 

@@ -65,13 +65,11 @@ def patches_of(scene: Scene) -> list[ArmPatch]:
         for row in range(ALONG):
             for column in range(count):
                 u, phi = cone.slant * row / (ALONG - 1), min(cone.wrap, step * column)
-                found.append(
-                    ArmPatch(item.name, item.link, u, phi, item.frustum.point(u, phi), item.frustum.normal(phi))
-                )
+                at = item.frustum.point(u, phi), item.frustum.normal(phi)
+                found.append(ArmPatch(item.name, item.link, u, phi, *at))
     if not found:
-        raise SceneError(
-            ["permissible speeds need a skin on a link that moves; there is one on the base only"], scene.name
-        )
+        why = "permissible speeds need a skin on a link that moves; there is one on the base only"
+        raise SceneError([why], scene.name)
     return found
 
 

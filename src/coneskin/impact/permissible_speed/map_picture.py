@@ -46,11 +46,8 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     rows = left.subplots(len(sheets), 1, squeeze=False)[:, 0]
     for axes, name in zip(rows, sheets, strict=True):
         drawn = _draw_sheet(axes, scene, found, name, highest)
-    left.colorbar(
-        drawn,
-        ax=list(rows),
-        label=f"permissible speed along the normal at a lever of {LEVERS[_LEVER_INDEX]:g} m/rad [m/s]",
-    )
+    label = f"permissible speed along the normal at a lever of {LEVERS[_LEVER_INDEX]:g} m/rad [m/s]"
+    left.colorbar(drawn, ax=list(rows), label=label)
     curves, forces = right.subplots(2, 1)
     _draw_curves(curves, found)
     _draw_forces(forces, scene, limits, found)

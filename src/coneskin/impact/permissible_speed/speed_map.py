@@ -330,13 +330,8 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
 def _check_speeds(scene: Scene, curves: list[_SpeedCurve]) -> None:
     for curve in curves:
         if curve.speeds[-1] <= 0.0:
-            raise SceneError(
-                [
-                    f"no speed of 1 mm/s or more keeps the limits of {curve.region}: a softer or thicker padding, a "
-                    "shorter reaction or a harder braking is needed"
-                ],
-                scene.name,
-            )
+            why = f"no speed of 1 mm/s or more keeps the limits of {curve.region}: a softer or thicker padding, a"
+            raise SceneError([f"{why} shorter reaction or a harder braking is needed"], scene.name)
 
 
 _FILE_HEADER = """\
