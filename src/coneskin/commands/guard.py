@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from coneskin.session.session import Session
 
 _START_TIMEOUT = 20.0  # s for the guard to become active
+_IDLE_TIME = 0.1  # s between two looks at the guard
 _LINE_PAUSE = 0.3  # s without a line after which all earlier ones have been read
 
 
@@ -130,7 +131,7 @@ class _Work:
 
     def run(self) -> None:
         """Guard until the end."""
-        person, stopped = _Person(), False
+        person, stopped, arm = _Person(), False, self._session.scene.arm
         self._end = time.monotonic() + self._duration
         while time.monotonic() < self._end:
             try:
@@ -142,18 +143,14 @@ class _Work:
             except ConeSkinError as exc:
                 self.code = 3 if isinstance(exc, Collision) else max(self.code, 1)
                 lost, stopped = self._lost(), isinstance(exc, Collision | RobotRefused)
-                if (lost and (self._once or not self._external)) or not (lost or stopped):
+                held = arm is not None and arm.control == "external"  # without a guard, at standstill
+                if (lost and (self._once or not held)) or not (lost or stopped):
                     raise
                 print_line(f"coneskin guard: {exc}", sys.stderr)
                 if self._once:
                     return
                 if lost:
                     self._hold()
-
-    @property
-    def _external(self) -> bool:
-        arm = self._session.scene.arm
-        return arm is not None and arm.control == "external"
 
     def _lost(self) -> bool:
         """Tell whether the guard hangs, or is gone."""
@@ -184,7 +181,7 @@ class _Work:
         while time.monotonic() < self._end:
             self._session.check()
             if moves is None:
-                person.answer_idle_line(0.1)
+                person.answer_idle_line()
             elif next(moves, None) is None:
                 return
 
@@ -214,10 +211,10 @@ class _Person:
         if ignored:
             print(f"{ignored} line(s) typed before the arm was latched are ignored", file=sys.stderr, flush=True)
 
-    def answer_idle_line(self, timeout: float) -> None:
-        """Take a line, if one comes within the timeout [s], while there is nothing to reset."""
+    def answer_idle_line(self) -> None:
+        """Take a line, if one comes within a moment, while there is nothing to reset."""
         with contextlib.suppress(queue.Empty):
-            self._lines.get(timeout=timeout)
+            self._lines.get(timeout=_IDLE_TIME)
             print("ignored: the arm is not latched", file=sys.stderr, flush=True)
 
     def serve(self, session: Session, timeout: float) -> bool:

@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     if many or args.vary or args.table or args.scheduler:
         return _replay_many(args, find_recordings(args.runs))
     if args.set or args.scene:
-        return _replay_with_settings(args.runs[0], args.set, args.scene, args.events, args.json)
+        return _replay_with_settings(args)
     return _replay_one(args)
 
 
@@ -141,11 +141,8 @@ def _report(result: Replay, start: float, listed: bool) -> None:
             print("  ... perhaps more; `coneskin runs diff` lists them all")
 
 
-def _replay_with_settings(
-    path: Path, words: Sequence[str], scene_file: Path | None, listed: bool, as_json: bool
-) -> int:
+def _replay_with_settings(args: argparse.Namespace) -> int:
     """Say what a run would have been with other settings, or another scene, and return the exit code 0."""
-    from coneskin.robot.guard.signals.event_text import describe
     from coneskin.runs.comparison import compare_decisions, comparison_facts, comparison_lines, without_invented
     from coneskin.runs.decisions import decide_again, recorded_decisions
     from coneskin.runs.event_file import event_facts
@@ -153,24 +150,24 @@ def _replay_with_settings(
     from coneskin.scene.reader import load_scene
     from coneskin.scene.settings import parse_settings
 
-    if scene_file is not None and words:
+    if args.scene is not None and args.set:
         raise SceneError(["--scene and --set exclude each other: set the value in the scene"], "replay")
-    run, settings = read_run(path, ProgressBar("read")), parse_settings(words)
+    run, settings = read_run(args.runs[0], ProgressBar("read")), parse_settings(args.set)
     recorded = recorded_decisions(run)
-    if scene_file is None:
+    if args.scene is None:
         before = decide_again(run, label="today's code", progress=ProgressBar("as it was"))
         after = decide_again(run, settings, progress=ProgressBar("as it would be"))
     else:
-        scene, bar = load_scene(scene_file), ProgressBar("as it would be")
-        before, after = recorded, decide_again(run, label=str(scene_file), scene=scene, progress=bar)
+        scene, bar = load_scene(args.scene), ProgressBar("as it would be")
+        before, after = recorded, decide_again(run, label=str(args.scene), scene=scene, progress=bar)
     comparison = compare_decisions(before, after)
     events = without_invented(after, recorded).events
-    if as_json:
+    if args.json:
         print(json.dumps({"comparison": comparison_facts(comparison), "events": event_facts(events, run.start)}))
         return 0
-    if listed:
-        for event in events:
-            print(describe(event, run.start))
+    if args.events:
+        for line in run.timeline(events):
+            print(line)
     print(printable("\n".join(comparison_lines(comparison))))
     return 0
 

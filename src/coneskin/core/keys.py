@@ -254,11 +254,11 @@ def _show(value: Any) -> str:
 
 
 def _range(key: Key, unit: str) -> str:
-    unit = f" {unit}" if unit else ""
-    low, high = math.isfinite(key.low), math.isfinite(key.high)
-    if low and high:
-        start = "above" if key.above else "0 or from" if key.or_zero else "from"
-        return f"{start} {key.low:g} to {key.high:g}{unit}"
-    if low:
-        return f"{'above' if key.above else 'at least'} {key.low:g}{unit}"
-    return f"at most {key.high:g}{unit}" if high else f"finite{unit and f' [{unit.strip()}]'}"
+    """Return the bounds of a key for a message: "from 1 to 500 mm", "0 or from 1 to 5000 mm", "at most 20 %"."""
+    if not (bounds := key.bounds):
+        return f"finite{unit and f' [{unit}]'}"
+    if key.choices:
+        return f"among {bounds}"
+    if bounds[0] in "-0123456789":
+        bounds = bounds.replace("0 or ", "0 or from ") if key.or_zero else f"from {bounds}"
+    return f"{bounds} {unit}".rstrip()

@@ -15,9 +15,10 @@ from typing import Any
 
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 
-from .decisions import SKIN_EVENTS, Decisions, EventPair, either_event, first_divergence, pair_events
+from .decisions import SKIN_EVENTS, Decisions, first_divergence
 from .replay.event_details import Tolerances, describe_differences, distance, milliseconds
 
+_MOST_LISTED = 40  # differences
 _STOP_WINDOW = 0.5  # s between a contact and the stop that is made for it
 _EVENT_WORDS: Mapping[str, str] = {
     EventName.CONTACT: "touch",
@@ -32,22 +33,82 @@ _EVENT_WORDS: Mapping[str, str] = {
 }
 
 
-def _pair_subjects(pairs: Sequence[EventPair]) -> list[str]:
+_EventPair = tuple[GuardEvent | None, GuardEvent | None]
+
+_PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
+
+
+def _pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent]) -> list[_EventPair]:
+    """Return the events of two runs in pairs, in the order of their times; None stands for one that is not there.
+
+    At one time the skin's events come before the arm's. Two events pair where they have the same name and sensor and
+    are nearest to each other, at most 0.5 s apart. What each guard says of the arm only once pairs at any time.
+    """
+    ours, theirs = _grouped(one), _grouped(other)
+    pairs: list[_EventPair] = []
+    for key in dict.fromkeys([*ours, *theirs]):
+        one_group, other_group = ours.get(key, []), theirs.get(key, [])
+        if len(one_group) == len(other_group) == 1 and key[0] not in SKIN_EVENTS:
+            pairs.append((one_group[0], other_group[0]))
+        else:
+            pairs += _pair_group(one_group, other_group)
+    return sorted(pairs, key=_order)
+
+
+def _either_event(pair: _EventPair) -> GuardEvent:
+    """Return the event of a pair, the first one where it has both."""
+    event = pair[0] if pair[0] is not None else pair[1]
+    assert event is not None
+    return event
+
+
+def _order(pair: _EventPair) -> tuple[float, bool]:
+    event = _either_event(pair)
+    return event.time, event.name not in SKIN_EVENTS
+
+
+def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEvent]]:
+    groups: dict[tuple[str, str], list[GuardEvent]] = {}
+    for event in events:
+        groups.setdefault((event.name, str(event.details.get("sensor", ""))), []).append(event)
+    return groups
+
+
+def _pair_group(one: list[GuardEvent], other: list[GuardEvent]) -> list[_EventPair]:
+    pairs: list[_EventPair] = []
+    i = j = 0
+    while i < len(one) and j < len(other):
+        apart = other[j].time - one[i].time
+        next_other = abs(other[j + 1].time - one[i].time) if j + 1 < len(other) else math.inf
+        next_one = abs(other[j].time - one[i + 1].time) if i + 1 < len(one) else math.inf
+        if apart < -_PAIR_WINDOW or (next_other < abs(apart) and len(other) - j > len(one) - i):
+            pairs.append((None, other[j]))
+            j += 1
+        elif apart > _PAIR_WINDOW or (next_one < abs(apart) and len(one) - i > len(other) - j):
+            pairs.append((one[i], None))
+            i += 1
+        else:
+            pairs.append((one[i], other[j]))
+            i, j = i + 1, j + 1
+    return [*pairs, *((event, None) for event in one[i:]), *((None, event) for event in other[j:])]
+
+
+def _pair_subjects(pairs: Sequence[_EventPair]) -> list[str]:
     """Return what each pair is about. Contacts have numbers, in the order in which they began."""
     counts = {False: 0, True: 0}
     contacts: list[tuple[str, float, str]] = []  # sensor, time, subject
     for pair in pairs:
-        if (event := either_event(pair)).name == EventName.CONTACT:
+        if (event := _either_event(pair)).name == EventName.CONTACT:
             new = pair[0] is None
             counts[new] += 1
             contacts.append(
                 (_touched_sensor(event), event.time, f"{'new contact' if new else 'contact'} {counts[new]}")
             )
-    subjects = [_subject(either_event(pair), contacts) for pair in pairs]
+    subjects = [_subject(_either_event(pair), contacts) for pair in pairs]
     often, seen = Counter(subjects), Counter[str]()
     for at, pair in enumerate(pairs):  # the first and the second standstill, and so on
         subject = subjects[at]
-        if subject == _event_words(either_event(pair)) and often[subject] > 1:
+        if subject == _event_words(_either_event(pair)) and often[subject] > 1:
             seen[subject] += 1
             subjects[at] = f"{subject} {seen[subject]}"
     return subjects
@@ -164,7 +225,7 @@ def compare_decisions(one: Decisions, other: Decisions, tolerances: Tolerances |
         diverged = first_divergence(first, second, tolerances)
     kept = _comparable(ones, diverged), _comparable(others, diverged)
     left_out = len(ones) + len(others) - len(kept[0]) - len(kept[1])
-    pairs = pair_events(*kept)
+    pairs = _pair_events(*kept)
     return Comparison(
         labels=(one.label, other.label),
         differences=tuple(_differences(pairs, tolerances)),
@@ -234,12 +295,12 @@ def _of_skin(reaction: GuardEvent) -> bool:
     return reaction.name == EventName.SPEED_REDUCED or "contact" in reaction.details
 
 
-def _differences(pairs: Sequence[EventPair], tolerances: Tolerances) -> list[Difference]:
+def _differences(pairs: Sequence[_EventPair], tolerances: Tolerances) -> list[Difference]:
     subjects = _pair_subjects(pairs)
     found: dict[str, Difference] = {}
     # a stop is told after its contact, whose event follows it
     stops_last = sorted(
-        zip(pairs, subjects, strict=True), key=lambda it: either_event(it[0]).name == EventName.STOPPING
+        zip(pairs, subjects, strict=True), key=lambda it: _either_event(it[0]).name == EventName.STOPPING
     )
     for (a, b), subject in stops_last:
         before = found.get(subject, Difference(subject, ()))
@@ -249,7 +310,7 @@ def _differences(pairs: Sequence[EventPair], tolerances: Tolerances) -> list[Dif
             words = [
                 word for word in words if not word.startswith(("located is ", "extent is ", "end is "))
             ]  # of course
-        if (name := _event_words(either_event((a, b)))) == subject.rstrip(
+        if (name := _event_words(_either_event((a, b)))) == subject.rstrip(
             " 0123456789"
         ):  # "retreat: missing", said once
             words = [word.removeprefix(f"{name} ").removeprefix("is ") for word in words]
@@ -263,7 +324,7 @@ def _differences(pairs: Sequence[EventPair], tolerances: Tolerances) -> list[Dif
 def _words(
     a: GuardEvent | None, b: GuardEvent | None, tolerances: Tolerances
 ) -> tuple[list[str], float | None, float | None]:
-    event = either_event((a, b))
+    event = _either_event((a, b))
     name = _event_words(event)
     if a is None or b is None:
         place = _place(event) if event.name == EventName.CONTACT else ""
@@ -287,12 +348,12 @@ def _place(event: GuardEvent) -> str:
     return f" on {_touched_sensor(event)}, u {1e3 * u:.1f} mm, phi {math.degrees(phi):.1f} deg"
 
 
-def comparison_lines(comparison: Comparison, most: int = 40) -> list[str]:
-    """Return a comparison in lines; at most so many differences are listed."""
+def comparison_lines(comparison: Comparison) -> list[str]:
+    """Return a comparison in lines, which list the first differences and count the rest."""
     one, other = comparison.labels
     lines = [f"{one} -> {other}", *(f"  {what}" for what in comparison.other_code)]
-    lines += [f"  {difference}" for difference in comparison.differences[:most]]
-    if (more := len(comparison.differences) - most) > 0:
+    lines += [f"  {difference}" for difference in comparison.differences[:_MOST_LISTED]]
+    if (more := len(comparison.differences) - _MOST_LISTED) > 0:
         lines.append(f"  ... and {more} more")
     if comparison.diverged is not None:
         left_out = _count(comparison.not_compared, "event")
@@ -342,15 +403,10 @@ def _verdict(comparison: Comparison) -> str:
     parts += [f"{count} {word}" for count, word in ((comparison.new, "new"), (comparison.missing, "missing")) if count]
     if comparison.farthest:
         parts.append(f"contacts moved by up to {1e3 * comparison.farthest:.2f} mm")
-    delays = [d.delay for d in comparison.differences if d.delay is not None]
-    if delays:
-        parts.append(_delays(delays))
+    if delays := [d.delay for d in comparison.differences if d.delay is not None]:
+        worst = max(delays, key=abs)
+        parts.append(f"up to {1e3 * abs(worst):.1f} ms {'later' if worst > 0.0 else 'earlier'}")
     return ("NOT the same: " if comparison.differences else "") + ", ".join(parts)
-
-
-def _delays(delays: Sequence[float]) -> str:
-    worst = max(delays, key=abs)
-    return f"up to {1e3 * abs(worst):.1f} ms {'later' if worst > 0.0 else 'earlier'}"
 
 
 def _count(number: int, word: str) -> str:

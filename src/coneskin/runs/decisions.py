@@ -1,7 +1,4 @@
-"""Decisions of a guard in one run: events and commands to the arm, recorded or made again by a replay.
-
-Events of two runs that stand for each other are paired here too.
-"""
+"""Decisions of a guard in one run: events and commands to the arm, recorded or made again by a replay."""
 
 from __future__ import annotations
 
@@ -116,65 +113,6 @@ def _numbers(text: str) -> tuple[float, ...]:
 SKIN_EVENTS = frozenset(
     {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED, EventName.TOUCH_ENDED}
 )
-
-EventPair = tuple[GuardEvent | None, GuardEvent | None]
-
-_PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
-
-
-def pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent]) -> list[EventPair]:
-    """Return the events of two runs in pairs, in the order of their times; None stands for one that is not there.
-
-    At one time the skin's events come before the arm's. Two events pair where they have the same name and sensor and
-    are nearest to each other, at most 0.5 s apart. What each guard says of the arm only once pairs at any time.
-    """
-    ours, theirs = _grouped(one), _grouped(other)
-    pairs: list[EventPair] = []
-    for key in dict.fromkeys([*ours, *theirs]):
-        one_group, other_group = ours.get(key, []), theirs.get(key, [])
-        if len(one_group) == len(other_group) == 1 and key[0] not in SKIN_EVENTS:
-            pairs.append((one_group[0], other_group[0]))
-        else:
-            pairs += _pair_group(one_group, other_group)
-    return sorted(pairs, key=_order)
-
-
-def either_event(pair: EventPair) -> GuardEvent:
-    """Return the event of a pair, the first one where it has both."""
-    event = pair[0] if pair[0] is not None else pair[1]
-    assert event is not None
-    return event
-
-
-def _order(pair: EventPair) -> tuple[float, bool]:
-    event = either_event(pair)
-    return event.time, event.name not in SKIN_EVENTS
-
-
-def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEvent]]:
-    groups: dict[tuple[str, str], list[GuardEvent]] = {}
-    for event in events:
-        groups.setdefault((event.name, str(event.details.get("sensor", ""))), []).append(event)
-    return groups
-
-
-def _pair_group(one: list[GuardEvent], other: list[GuardEvent]) -> list[EventPair]:
-    pairs: list[EventPair] = []
-    i = j = 0
-    while i < len(one) and j < len(other):
-        apart = other[j].time - one[i].time
-        next_other = abs(other[j + 1].time - one[i].time) if j + 1 < len(other) else math.inf
-        next_one = abs(other[j].time - one[i + 1].time) if i + 1 < len(one) else math.inf
-        if apart < -_PAIR_WINDOW or (next_other < abs(apart) and len(other) - j > len(one) - i):
-            pairs.append((None, other[j]))
-            j += 1
-        elif apart > _PAIR_WINDOW or (next_one < abs(apart) and len(one) - i > len(other) - j):
-            pairs.append((one[i], None))
-            i += 1
-        else:
-            pairs.append((one[i], other[j]))
-            i, j = i + 1, j + 1
-    return [*pairs, *((event, None) for event in one[i:]), *((None, event) for event in other[j:])]
 
 
 @dataclass(frozen=True, slots=True)

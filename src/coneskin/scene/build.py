@@ -48,16 +48,11 @@ def build_core(
 
     limits, stream = scene.monitoring_limits, build_stream(scene, detector)
     placed = place_on_arm(scene) if placed is None else placed
-    levels = {item.sensor.name: item.sensor.thresholds for item in scene.sensors}
-    tables = {item.sensor.name: item.sensor.force_table for item in scene.sensors}
-    sensors = [
-        GuardedSensor(
-            *(item.name, item.link_name, item.link, item.place, at.touch_level, at.location_level),
-            force=None if (table := tables[item.name]) is None else table.force,
-        )
-        for item in placed
-        for at in (levels[item.name],)
-    ]
+    sensors = []
+    for at, sensor in zip(placed, (item.sensor for item in scene.sensors), strict=True):
+        levels, force = sensor.thresholds, sensor.force_table.force if sensor.force_table else None
+        place = at.name, at.link_name, at.link, at.place
+        sensors.append(GuardedSensor(*place, levels.touch_level, levels.location_level, force=force))
     return GuardCore(stream, sensors, limits, _arm(scene, placed) if scene.arm else None, withheld_motion(scene))
 
 

@@ -34,15 +34,9 @@ def virtual_skin(scene: Scene, script: bool = True, pressed: bool = False) -> Vi
 
     assert scene.source is not None
     make = partial(PressedSkin, coarse=True) if pressed else VirtualSkin
-    return make(
-        [item.sensor for item in scene.sensors],
-        scene.source.touches if script else (),
-        rate_hz=scene.source.settings["rate"],
-        seed=scene.source.settings["seed"],
-        model=scene.source.settings["model"],
-        frame_length=scene.source.settings["frame_length"],
-        wires=scene.source.settings["wires"],
-    )
+    sensors, touches = [item.sensor for item in scene.sensors], scene.source.touches if script else ()
+    settings = {name: scene.source.settings[name] for name in ("seed", "model", "frame_length", "wires")}
+    return make(sensors, touches, rate_hz=scene.source.settings["rate"], **settings)
 
 
 def main(arguments: list[str]) -> int:

@@ -278,17 +278,8 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel],
 
 _TABLE_COLUMNS = (
     *("run", "path", "variant", "error", "complete", "same", "first_difference", "contacts", "stops", "diverged_s"),
-    *(
-        "moved_mm",
-        "truth",
-        "touches",
-        "missed",
-        "false_alarms",
-        "unlabeled",
-        "delay_median_ms",
-        "delay_max_ms",
-        "duration_s",
-    ),
+    *("moved_mm", "truth", "touches", "missed", "false_alarms", "unlabeled", "delay_median_ms", "delay_max_ms"),
+    "duration_s",
 )
 
 
