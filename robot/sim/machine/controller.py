@@ -128,6 +128,10 @@ class _SafetySystem:
 POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
 
 
+def _no_rtde(name: str) -> Any:
+    raise ScriptError(f"{name}: this controller has no RTDE")
+
+
 def _plain(value: object) -> object:
     return list(value) if isinstance(value, list | tuple) else str(value)
 
@@ -151,6 +155,7 @@ class Controller:
         cycle: number of control cycles since power-on.
         remote_control: False in local control, in which no program and no command is taken.
         outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
+        rtde_value: returns the value of an output of RTDE, which those set who know these.
         inputs: what clients write.
         program: main program; None while none is loaded.
         secondary: ``sec`` programs that run beside it.
@@ -175,6 +180,7 @@ class Controller:
         self.digital_outputs = 0
         self.terminals = Terminals()
         self.outside_time: Callable[[], float] = lambda: self.timestamp
+        self.rtde_value: Callable[[str], Any] = _no_rtde
         self.frozen = 0.0  # time in which no cycle ran though its clock went on [s]
         self.beyond = False  # programs may connect to other computers
         self.slider = 1.0

@@ -10,7 +10,7 @@ Source: Universal Robots, "The URScript Programming Language", modules interface
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Generator, Mapping
 from typing import Any
 
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
@@ -32,6 +32,15 @@ def index_of(address: Any, count: int) -> int:
     if isinstance(address, str | list) or not 0 <= (index := int(address)) < count:
         raise ScriptError(f"a number from 0 to {count - 1} was expected, got {show(address)}")
     return index
+
+
+class AbsentHandle:
+    """Handle of a device that is not there."""
+
+    def call(self, _name: str, _arguments: Any, _host: ScriptHost) -> Generator[None, None, int]:
+        """Return 0, whatever is called."""
+        yield from ()
+        return 0
 
 
 class IoFunctions:
@@ -63,7 +72,18 @@ class IoFunctions:
             raise ScriptError(f"there is no Modbus signal {show(name)}")
         return self._program.signals[str(name)]
 
+    def eip_writer_factory(self, name: Any, size: int) -> AbsentHandle:
+        """Return a handle of data to a scanner of EtherNet/IP that is not there: its methods do nothing."""
+        self._tell_not_simulated(f"EtherNet/IP: no scanner is connected to {show(name)} of {show(size)} bytes")
+        return AbsentHandle()
+
+    eip_reader_factory = eip_writer_factory
+
     # registers
+
+    def get_rtde_value(self, name: Any) -> Any:
+        """Return the value of an output of RTDE."""
+        return self._host.rtde_value(str(name))
 
     def read_input_integer_register(self, address: int) -> int:
         """Return an integer that a client wrote."""

@@ -18,6 +18,7 @@ from coneskin.robot.sim.urscript.translator import Interpreter, Translation
 from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError, call_method
 
 from .builtins import Builtins
+from .io_functions import AbsentHandle
 from .script_host import ScriptHost
 from .script_socket import ScriptSocket
 from .socket_functions import RemoteHandle
@@ -190,7 +191,7 @@ class Program:
     def _call_method(self, base: Any, keys: Any, name: str, arguments: Any) -> Generator[None, None, tuple[Any, Any]]:
         """Call a method of what is found in a value; return the value after it, and what the method returns."""
         found = OPERATIONS["_at"](base, *keys)
-        if isinstance(found, RemoteHandle):
+        if isinstance(found, RemoteHandle | AbsentHandle):
             return base, (yield from found.call(name, arguments, self._host))
         after, result = call_method(found, name, arguments)
         return (base if after is found else OPERATIONS["_with"](after, keys, base)), result

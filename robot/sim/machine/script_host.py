@@ -43,6 +43,7 @@ class ScriptHost(Protocol):
     digital_outputs: int
     terminals: Terminals
     outside_time: Callable[[], float]
+    rtde_value: Callable[[str], Any]
     beyond: bool
     gravity: tuple[float, ...]
     payload: float

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
@@ -20,7 +21,7 @@ from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
 from coneskin.robot.sim.machine.states import MOVING, RobotMode, Runtime, Version, robot_bits, safety_bits
 from coneskin.robot.sim.motion.arm import SimulatedArm
-from coneskin.robot.sim.urscript.values import values_of
+from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import (
     IN_USE,
     NOT_FOUND,
@@ -83,7 +84,7 @@ class RtdeOutputs:
         self._pose: Value = _SIX_ZEROS
         self._twist_at = -1
         self._twist: Value = _SIX_ZEROS
-        arm = c.arm
+        arm, c.rtde_value = c.arm, self.value
         self._getters: dict[str, Callable[[], Value | Sequence[float]]] = {
             "timestamp": lambda: c.timestamp,
             "control_step": lambda: c.cycle,
@@ -158,6 +159,17 @@ class RtdeOutputs:
         zero: Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
         constant = _CONSTANT_OUTPUTS.get(name, zero)
         return lambda: constant
+
+    def value(self, name: str) -> Any:
+        """Return the present value of an output to a program.
+
+        Raises:
+            ScriptError: the controller has none of that name.
+        """
+        if not available(name, self._c.options.version):
+            raise ScriptError(f"RTDE has no output {name[:99]!r}")
+        value = self.getter(name)()
+        return Array(value) if isinstance(value, Sequence) else value
 
     def _tcp_pose(self) -> Value:
         arm = self._c.arm

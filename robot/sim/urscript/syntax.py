@@ -80,6 +80,10 @@ _BINARY_OPERATORS = (
     {"*": "_multiply({}, {})", "/": "_divide({}, {})", "%": "_modulo({}, {})"},
 )
 _COMPARISON_LEVEL = 2
+_NOT_SIMULATED = {
+    "time",
+    *(f"request_{kind}_from_primary_client" for kind in ("boolean", "float", "integer", "string")),
+}
 #: words that can be no variable
 _RESERVED_WORDS = {"def", "sec", "thread", "end", "if", "elif", "else", "while", "switch", "case", "default", "return"}
 _RESERVED_WORDS |= {"break", "continue", "halt", "global", "local"}
@@ -261,8 +265,9 @@ class ExpressionParser:
         if name in self._builtins:
             return f"b_{name}"
         words = self._text.split("\n")[line - 1]
+        known = " (URScript, but not simulated)" if name in _NOT_SIMULATED else ""
         raise ScriptError(
-            f"line {line}: the controller has no function {name} in {words.strip()[:200]!r}",
+            f"line {line}: the controller has no function {name}{known} in {words.strip()[:200]!r}",
             title=f"compile_error_name_not_found:{name}:",
             line=line,
             column=words.find(name) + 1,

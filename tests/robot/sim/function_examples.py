@@ -141,6 +141,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "get_configurable_digital_out": "set_configurable_digital_out(7, True)\nget_configurable_digital_out(7)",
         "get_digital_in": "get_digital_in(17) == False",
         "get_digital_out": "set_tool_digital_out(1, True)\nget_digital_out(17)",
+        "get_rtde_value": 'get_rtde_value("actual_q") == get_joint_positions() and get_rtde_value("timestamp") > 0',
         "get_flag": "get_flag(31) == False",
         "get_standard_analog_in": "get_standard_analog_in(1) == 0",
         "get_standard_analog_out": "get_standard_analog_out(0) == 0",
@@ -172,6 +173,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "write_output_integer_register": "write_output_integer_register(1, 2)\nread_output_integer_register(1) == 2",
     },
     "not there: answered as by a device that is not connected, and told to the clients once": {
+        "eip_reader_factory": 'eip_reader_factory("101", 8).read("door") == 0',
+        "eip_writer_factory": 'eip_writer_factory("111", 8).define_bit(0, 1, "door") == 0',
         "modbus_add_signal": 'modbus_add_signal("192.168.1.9", 255, 0, 0, "in", True, 3)\n'
         'modbus_get_signal_status("in") == [False, False, False]',
         "modbus_add_rw_signal": 'modbus_add_rw_signal("192.168.1.9", 255, 5, 2, 15, 2, "a")\n'

@@ -29,6 +29,7 @@ def test_the_example_of_each_function_holds(name: str) -> None:
     *before, last = _ALL[name].splitlines()
     body = [*before, f"if {last}:", "write_output_integer_register(0, 1)", "end"]
     controller = Controller(Options(start_delay=0.0, start_q=HOME))
+    RtdeOutputs(controller)  # whose values a program reads
     controller.load(translate("def p():\n" + "\n".join(body) + "\nend\n", Builtins.names(), Builtins.blocking()))
     controller.update()
     for _ in range(3000):
@@ -83,6 +84,7 @@ def test_every_function_has_an_example() -> None:
         ('str_cat("' + "x" * 1000 + '", "' + "y" * 30 + '")', "at most 1023 characters"),
         ('socket_open("192.0.2.1", 80)', "start it with --host"),
         ('socket_open("example.org", 80)', "IPv4 address"),
+        ('get_rtde_value("actual_q")', "this controller has no RTDE"),
         ("set_tool_voltage(13)", "0, 12 or 24 V"),
         ("set_standard_analog_out(0, 1.5)", "from 0 to 1"),
         ("optimovej([0, 0, 0, 0, 0, 0], a=2)", "shares"),

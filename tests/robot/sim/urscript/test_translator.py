@@ -243,6 +243,7 @@ def test_a_value_may_stand_at_the_start_of_the_next_line() -> None:
     [
         ("def main():\n  x = \n  y = 1\nend", "line 3: '=' is unexpected in 'y = 1'"),
         ("def main():\n  explode(3)\nend", "line 2: the controller has no function explode in 'explode(3)'"),
+        ("def main():\n  x = time()\nend", "no function time (URScript, but not simulated)"),
         ("def main():\n  if True\n    x = 1\n  end\nend", "line 2: expected ':', got the end of the line in 'if True'"),
         ("def main():\n  while True:\n    sync()\nend", "a block has no 'end'"),
         ("def main():\n  x = 3 $ 4\nend", "is not URScript"),
