@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.defects import Defect, DefectKind
-from coneskin.core.version import running_version
+from coneskin.core.version import code_versions, recorded_version
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.cut import cut_run
 from coneskin.runs.replay.event_details import Tolerances
@@ -106,5 +106,5 @@ def test_a_cut_that_the_disk_does_not_take_leaves_nothing(
 
 def test_a_cut_says_that_its_events_are_those_of_todays_code(collision: Run, tmp_path: Path) -> None:
     run = read_run(cut_run(collision, tmp_path / "cut.rec", around=2.95).path)
-    assert run.recorded_by == running_version()
+    assert run.recorded_by == recorded_version(code_versions())
     assert run.other_code() == ()

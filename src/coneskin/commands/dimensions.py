@@ -34,7 +34,8 @@ def add_key_options(
     for key in keys:
         default = (defaults or {}).get(key.plain)
         text = key.meaning.replace("%", "%%") + (f" (default: {default})" if default else "")
-        add(option_name(key), type=key.kind, metavar=_metavar(key), required=key.plain in required, help=text)
+        unit = key.suffix.removeprefix("_").upper() or "N"
+        add(option_name(key), type=key.kind, metavar=unit, required=key.plain in required, help=text)
 
 
 def add_cone_options(add: Callable[..., Any]) -> None:
@@ -53,11 +54,6 @@ def given_cone(args: argparse.Namespace) -> Frustum:
 
     dimensions = given_keys(args, LINK_CONE_KEYS)
     return Frustum(**{"radius2": dimensions["radius1"], **dimensions})
-
-
-def _metavar(key: Key) -> str:
-    """Return the unit of a key in capitals, as the placeholder of its value; N for a plain number."""
-    return key.suffix.removeprefix("_").upper() or "N"
 
 
 def given_keys(args: argparse.Namespace, keys: Sequence[Key]) -> dict[str, float]:

@@ -65,7 +65,6 @@ def run(args: argparse.Namespace) -> int:
     if args.check:
         return _check(scene, args.json)
     from coneskin.commissioning.examination.examination import Doctor
-    from coneskin.core.finding import exit_code
 
     def tell(finding: Finding) -> None:
         if args.json:
@@ -85,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget))
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
-    code = exit_code(doctor.findings)
+    code = 1 if any(finding.verdict == "bad" for finding in doctor.findings) else 0
     if doctor.patches:
         _offer_patch(args, scene, doctor)
     elif not args.json:

@@ -211,15 +211,13 @@ def _verify(args: argparse.Namespace) -> int:
 
 
 def _cut(args: argparse.Namespace) -> int:
-    from coneskin.runs.cut import cut_run, first_touch
+    from coneskin.runs.cut import cut_run
     from coneskin.runs.run_files import find_recordings, run_name
 
     (path,) = find_recordings([args.run])[:1]
     name = run_name(path)
     target = args.output or Path(f"{name}-cut.rec")
-    run = _read(path)
-    around = first_touch(run) if args.around is None else args.around
-    done = cut_run(run, target, around, args.keep, name, ProgressBar("the whole run"))
+    done = cut_run(_read(path), target, args.around, args.keep, name, ProgressBar("the whole run"))
     if args.json:
         facts = {"path": str(done.path), "size_bytes": done.size, "since_s": done.since, "until_s": done.until}
         facts |= {"contacts": done.contacts, "active": done.active, "other_reaction": done.other_reaction or None}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -45,8 +44,3 @@ def judged(item: str, verdict: Verdict | bool, value: str, rule: str, remedy: st
     """Return a finding, without the remedy where nothing is wrong; for the verdict, True is "ok" and False "bad"."""
     word: Verdict = "ok" if verdict is True else "bad" if verdict is False else verdict
     return Finding(item, word, value, rule, "" if word == "ok" else remedy)
-
-
-def exit_code(findings: Iterable[Finding]) -> int:
-    """Return 1 where anything is bad, else 0."""
-    return 1 if any(finding.verdict == "bad" for finding in findings) else 0

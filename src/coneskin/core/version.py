@@ -47,13 +47,11 @@ def code_versions() -> dict[str, str]:
     return dict(zip(_HEADER_KEYS, (__version__, _code_commit(), code_build()), strict=True))
 
 
-def running_version() -> str:
-    """Return the version of this code for people, such as ``0.1.0 (984714c, pure)``."""
-    return recorded_version(code_versions())
-
-
 def recorded_version(header: Mapping[str, Any]) -> str:
-    """Return the version of the code that made a recording, from its header; empty where that does not tell."""
+    """Return the version of code for people, such as ``0.1.0 (984714c, pure)``; empty where no version is told.
+
+    It comes from what the code says of itself: the header of a recording, or ``code_versions``.
+    """
     version, commit, build = (found if isinstance(found := header.get(key), str) else "" for key in _HEADER_KEYS)
     details = ", ".join(filter(None, (commit[:_COMMIT_DIGITS], build)))
     return f"{version} ({details})" if version and details else version

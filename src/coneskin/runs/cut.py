@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import draft_of
+from coneskin.core.files import draft_of, explain_os_error
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
@@ -82,12 +82,8 @@ class _CutRun:
     other_reaction: str
 
 
-def first_touch(run: Run) -> float:
-    """Return when the first touch of a run was seen [s since the start of the run].
-
-    Raises:
-        RecordingError: none was.
-    """
+def _first_touch(run: Run) -> float:
+    """Return when the first touch of a run was seen [s since the start of the run]."""
     for event in run.events:
         if event.name == EventName.CONTACT:
             return event.time - run.start
@@ -95,12 +91,12 @@ def first_touch(run: Run) -> float:
 
 
 def cut_run(
-    run: Run, target: Path, around: float, keep: float | None = None, name: str = "", progress: Progress = silent
+    run: Run, target: Path, around: float | None, keep: float | None = None, name: str = "", progress: Progress = silent
 ) -> _CutRun:
     """Write the part of a run around a moment as a recording of its own.
 
     Args:
-        around: the moment [s since the start of the run].
+        around: the moment [s since the start of the run]; None: when the first touch was seen.
         keep: how much of it [s]: half before the moment, and as much as a guard needs to become active, half after it.
             None: 1 s, begun as much earlier as it takes until the contacts are those of the whole run.
         name: of the whole run, for the new one's header.
@@ -109,6 +105,7 @@ def cut_run(
         RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole
             run; or the file is there already.
     """
+    around = _first_touch(run) if around is None else around
     length = _KEPT_TIME if keep is None else keep
     if not (math.isfinite(around) and math.isfinite(length) and length > 0.0):
         raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {length!r} s")
@@ -172,13 +169,11 @@ def _reaction(events: Sequence[GuardEvent], since: float, until: float) -> list[
 
 def _record(target: Path, header: Block, blocks: Sequence[Block]) -> None:
     """Write a recording whole or not at all, in a folder that is made."""
-    try:
+    hint = "; a recording is never overwritten: choose another file" if target.exists() else ""
+    with explain_os_error(RecordingError, f"cannot make the recording {target}", hint):
         target.parent.mkdir(parents=True, exist_ok=True)
         with draft_of(target) as draft, Recorder(draft, copied=frozenset({BlockKind.HEADER, BlockKind.SURFACE})) as to:
             to.write(header, *blocks)
-    except OSError as exc:
-        hint = "; a recording is never overwritten: choose another file" if isinstance(exc, FileExistsError) else ""
-        raise RecordingError(f"cannot make the recording {target}: {exc.strerror or exc}{hint}") from exc
 
 
 def _of_window(decisions: Decisions, since: float, until: float) -> Decisions:

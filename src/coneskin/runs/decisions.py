@@ -80,7 +80,11 @@ def _command_in(payload: bytes, time: float) -> _ArmCommand:
     if body in (b"sent", b"not sent"):  # with which deceleration, a recording does not tell
         return _ArmCommand(time, name, ())
     if name in ("driver", "watchdog"):
-        return _of_message(time, body)
+        try:
+            command = decode_command(body)
+        except ValueError:
+            return _ArmCommand(time, repr(body), ())
+        return _ArmCommand(time, type(command).__name__, _numbers(repr(command)))
     return _ArmCommand(time, name, _numbers(body.decode("utf-8", "replace")))
 
 
@@ -95,14 +99,6 @@ def first_divergence(
     shared = min(len(one), len(other))
     rest = [*one[shared:], *other[shared:]]
     return rest[0].time if rest else math.inf
-
-
-def _of_message(time: float, message: bytes) -> _ArmCommand:
-    try:
-        command = decode_command(message)
-    except ValueError:
-        return _ArmCommand(time, repr(message), ())
-    return _ArmCommand(time, type(command).__name__, _numbers(repr(command)))
 
 
 def _numbers(text: str) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from coneskin.core.recording.block import is_time
 from coneskin.core.text import read_json
 from coneskin.robot.guard.signals.journal import SESSION_EVENTS, EventName, GuardEvent
 
-from .comparison import Comparison, compare_decisions, comparison_lines, without_invented
+from .comparison import Comparison, compare_decisions, without_invented
 from .decisions import Decisions, decide_again, recorded_decisions
 from .replay.event_details import Tolerances
 from .replay.run import read_run
@@ -105,14 +105,6 @@ def update_golden(recording: Path, tolerances: Tolerances | None = None) -> bool
     recorded, again = _decide(recording)
     _write_events(golden_path(recording), without_invented(again, recorded).events, recorded.start)
     return True
-
-
-def describe_failure(recording: Path, comparison: Comparison) -> str:
-    """Return the lines of a failed comparison, and what to do."""
-    first, *lines = comparison_lines(comparison)
-    return "\n".join(
-        [f"{recording}: {first}", *lines, "  if that is meant: review it, then run again with --coneskin-update"]
-    )
 
 
 def _decide(recording: Path) -> tuple[Decisions, Decisions]:

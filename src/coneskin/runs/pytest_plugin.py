@@ -95,7 +95,8 @@ class _RecordedRunItem(pytest.Item):
 
     def runtest(self) -> None:
         """Replay the run and compare."""
-        from .event_file import check_golden, describe_failure, golden_path, update_golden
+        from .comparison import comparison_lines
+        from .event_file import check_golden, golden_path, update_golden
 
         tolerances = _tolerances(self.config)
         if self.config.getoption("--coneskin-update"):
@@ -104,7 +105,9 @@ class _RecordedRunItem(pytest.Item):
             return
         comparison = check_golden(self.path, tolerances)
         if not comparison.same:
-            raise _RunDiffers(describe_failure(self.path, comparison))
+            lines = "\n".join(comparison_lines(comparison))
+            hint = "  if that is meant: review it, then run again with --coneskin-update"
+            raise _RunDiffers(f"{self.path}: {lines}\n{hint}")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """Return the lines for a person; a traceback only where it is ours that fails."""

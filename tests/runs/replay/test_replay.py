@@ -14,7 +14,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.recorder import Recorder
-from coneskin.core.version import code_versions, running_version
+from coneskin.core.version import code_versions, recorded_version
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.comparison import compare_decisions, comparison_lines
 from coneskin.runs.decisions import decide_again, recorded_decisions
@@ -212,7 +212,9 @@ def test_a_replay_tells_how_far_it_is(run: Run) -> None:
 
 def test_other_code_and_other_filled_in_values_are_named_before_any_difference(run: Run) -> None:
     assert run.recorded_by == ""  # the rig writes no version
-    assert run.other_code() == (f"recorded by coneskin an unknown version, replayed by {running_version()}",)
+    assert run.other_code() == (
+        f"recorded by coneskin an unknown version, replayed by {recorded_version(code_versions())}",
+    )
     mine = {**code_versions(), "resolved": resolved_settings(run.scene())}
     assert changed(run, header={**run.header, **mine}).other_code() == ()
     mine["resolved"]["monitoring"]["settle"] = 0.125

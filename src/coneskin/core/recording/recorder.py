@@ -139,12 +139,10 @@ class Recorder:
         path = part_path(self.path, len(self.parts))
         try:
             file = open(path, "xb", buffering=0, opener=open_for_owner)  # noqa: SIM115 - closed by ``close``
+        except FileExistsError:
+            hint = "name another file, or none where the scene has [recording]: each run then has a folder of its own"
+            raise RecordingError(f"{path} is there already, and a recording is never overwritten: {hint}") from None
         except OSError as exc:
-            if isinstance(exc, FileExistsError):
-                hint = (
-                    "name another file, or none where the scene has [recording]: each run then has a folder of its own"
-                )
-                raise RecordingError(f"{path} is there already, and a recording is never overwritten: {hint}") from None
             raise RecordingError(f"cannot make the recording {path}: {exc.strerror or exc}") from exc
         _mark_recorded(file)
         try:

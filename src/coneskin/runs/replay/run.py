@@ -20,7 +20,7 @@ from coneskin.core.recording.block import ALL_KINDS, Block, is_time
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import Recording, read_recording
 from coneskin.core.text import read_json
-from coneskin.core.version import recorded_version, running_version
+from coneskin.core.version import code_versions, recorded_version
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
@@ -282,7 +282,7 @@ class Run:
         """
         from coneskin.scene.settings import changed_settings
 
-        then, now = self.recorded_by or "an unknown version", running_version()
+        then, now = self.recorded_by or "an unknown version", recorded_version(code_versions())
         words = () if then == now else (f"recorded by coneskin {then}, replayed by {now}",)
         changed = changed_settings(self.header.get("resolved"), self.scene())
         return *words, *(f"the scene is filled in otherwise than when it was recorded: {what}" for what in changed)

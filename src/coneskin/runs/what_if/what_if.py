@@ -144,11 +144,6 @@ class _DetectionScore:
     false_alarms: int
     delays: tuple[float, ...]
 
-    @property
-    def median_delay(self) -> float | None:
-        """Median of the delays [s], or None."""
-        return statistics.median(self.delays) if self.delays else None
-
 
 def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> _DetectionScore:
     """Compare the contacts that a guard sees with the touches that there were.
@@ -259,7 +254,7 @@ def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel]
 def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel], truth: str) -> dict[str, Any]:
     comparison = compare_decisions(recorded, again)
     score = _score_detection(again, labels)
-    median = score.median_delay
+    delays, known = score.delays, truth != "recorded"
     return {
         "same": comparison.same,
         "first_difference": str(comparison.differences[0]) if comparison.differences else None,
@@ -269,10 +264,10 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel],
         "moved_mm": 1e3 * comparison.farthest,
         "touches": score.touches,
         "missed": score.missed,
-        "false_alarms": 0 if truth == "recorded" else score.false_alarms,
-        "unlabeled": score.false_alarms if truth == "recorded" else 0,
-        "delay_median_ms": None if median is None else 1e3 * median,
-        "delay_max_ms": 1e3 * max(score.delays) if score.delays else None,
+        "false_alarms": score.false_alarms if known else 0,
+        "unlabeled": 0 if known else score.false_alarms,
+        "delay_median_ms": 1e3 * statistics.median(delays) if delays else None,
+        "delay_max_ms": 1e3 * max(delays) if delays else None,
     }
 
 
