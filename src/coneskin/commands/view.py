@@ -54,13 +54,14 @@ def run(args: argparse.Namespace) -> int:
         if scenes:
             raise SceneError(["--html writes recordings: name runs, such as runs/*"], str(scenes[0]))
         return _write(args)
-    from coneskin.view.live_run import is_live
+    from coneskin.view.live_run import LiveRun, is_live
 
-    recordings = [path / "run.rec" if path.is_dir() else path for path in args.what]
     if scenes:
         return _follow_scene(args, scenes[0])
-    if len(recordings) == 1 and is_live(recordings[0]):
-        return _follow_run(args, recordings[0])
+    recording = args.what[0] / "run.rec" if args.what[0].is_dir() else args.what[0]
+    if len(args.what) == 1 and is_live(recording):
+        runs = [LiveRun(recording)]
+        return _follow(args, runs[0].course.stage, lambda _: runs.pop() if runs else None)
     return _show(args)
 
 
@@ -81,17 +82,9 @@ def _show(args: argparse.Namespace) -> int:
     from coneskin.view.run_page import show_runs
 
     with _server(args) as server:
-        courses = read_courses(args.what)
-        show_runs(server, courses)
+        show_runs(server, read_courses(args.what))
         show_page(args, server.url, _PAGE_WORDS).wait()
     return 0
-
-
-def _follow_run(args: argparse.Namespace, recording: Path) -> int:
-    from coneskin.view.live_run import LiveRun
-
-    runs = [LiveRun(recording)]
-    return _follow(args, runs[0].course.stage, lambda _: runs.pop() if runs else None)
 
 
 def _follow_scene(args: argparse.Namespace, path: Path) -> int:

@@ -57,10 +57,10 @@ def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
 
 def _read_events(path: Path, start: float) -> list[GuardEvent]:
     """Return the events in a file; arguments and errors as of ``parse_events``."""
+    with explain_os_error(RecordingError, f"cannot read the events {path}"):
+        data = read_file(path, _MAX_SIZE)
     try:
-        facts = read_json(read_file(path, _MAX_SIZE))
-    except OSError as exc:
-        raise RecordingError(f"cannot read the events {path}: {exc.strerror or exc}") from exc
+        facts = read_json(data)
     except ValueError as exc:
         raise RecordingError(f"{path} is no JSON: {exc}") from exc
     return _parse_events(facts, start, str(path))

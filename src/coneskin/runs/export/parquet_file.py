@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 
 from coneskin.core.errors import MissingExtra, RecordingError
+from coneskin.core.files import explain_os_error
 
 from .tables import Table
 
@@ -22,8 +24,9 @@ def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
         import pyarrow.parquet as pq
     except ImportError as exc:
         raise MissingExtra("pyarrow", "a Parquet file", "tables") from exc
-    rows, writer = 0, None
-    try:
+    rows = 0
+    with explain_os_error(RecordingError, f"cannot write {path}"), ExitStack() as stack:
+        writer = None
         for piece in pieces:
             part = pa.table(dict(piece), schema=None if writer is None else writer.schema)
             if writer is None:
@@ -31,13 +34,8 @@ def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
                     (column.name, pa.int64() if pa.types.is_null(column.type) else column.type)
                     for column in part.schema
                 ]
-                writer = pq.ParquetWriter(path, pa.schema(kinds), compression="zstd")
+                writer = stack.enter_context(pq.ParquetWriter(path, pa.schema(kinds), compression="zstd"))
                 part = part.cast(writer.schema)
             writer.write_table(part)
             rows += part.num_rows
-    except OSError as exc:
-        raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
-    finally:
-        if writer is not None:
-            writer.close()
     return rows

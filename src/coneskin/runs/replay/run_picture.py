@@ -59,8 +59,11 @@ def _compose(run: Run) -> Figure:
     grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.5, 1.0), height_ratios=heights)
     _draw_speeds(figure.add_subplot(grid[0, 0]), states, run.events, zero, window, word)
     if slider:
-        _draw_slider(figure.add_subplot(grid[1, 0]), slider, zero, window)
+        _draw_slider(figure.add_subplot(grid[1, 0]), slider, zero)
     _draw_touch(figure.add_subplot(grid[-1, 0]), run, scene, zero, window)
+    for axes in figure.axes:
+        axes.set_xlim(*(1e3 * (t - zero) for t in window))
+        axes.grid()
     away, back = (_first(run.events, name, zero) for name in ("retreating", "retreated"))
     if away is not None and away.time < window[1]:
         until = window[1] if back is None else back.time
@@ -108,15 +111,13 @@ def _marks(events: list[GuardEvent], zero: float, window: tuple[float, float]) -
     return marks
 
 
-def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float, window: tuple[float, float]) -> None:
+def _draw_slider(axes: Any, slider: list[tuple[float, float]], zero: float) -> None:
     axes.plot(
         [1e3 * (t - zero) for t, _ in slider], [100.0 * f for _, f in slider], drawstyle="steps-post", color="0.2"
     )
     axes.axvline(0.0, color=_TOUCH_COLOR, lw=1.0)
     axes.set_ylabel("speed slider [%]")
     axes.set_ylim(0.0, 105.0)
-    axes.set_xlim(*(1e3 * (t - zero) for t in window))
-    axes.grid(alpha=0.3)
 
 
 def _draw_speeds(
@@ -149,9 +150,7 @@ def _draw_speeds(
         axes.axvline(1e3 * (time - zero), color="0.6", lw=0.7, ls=":")
         axes.text(1e3 * (time - zero), 1.01, f" {words}", color="0.3", ha="left", **style)
     axes.set_ylabel("joint speed [rad/s]")
-    axes.set_xlim(*(1e3 * (t - zero) for t in window))
     axes.legend(ncols=3, loc="best")
-    axes.grid(alpha=0.3)
 
 
 def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[float, float]) -> None:
@@ -171,10 +170,8 @@ def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[fl
         axes.axhline(item.sensor.thresholds.touch_level, color=_TOUCH_COLOR, lw=0.8, ls="--")
         axes.axhline(item.sensor.thresholds.release_level, color="0.5", lw=0.8, ls=":")
     axes.set_ylabel("touch level (dashed: on, dotted: off)")
-    axes.set_xlim(*(1e3 * (t - zero) for t in window))
     axes.set_ylim(0.0, 1.0)
     axes.legend(fontsize=7)
-    axes.grid(alpha=0.3)
 
 
 def _draw_arm(

@@ -65,16 +65,15 @@ def _apply_calibration(
         problems.append(f"{where}.calibration: a recording carries the numbers of its calibrations and names no file")
     elif both := sorted(key for key in _CALIBRATION_NAMES[1:] if key in table):
         problems.append(f"{where}: {', '.join(both)} cannot stand beside calibration, which gives them: leave one out")
-    elif name is not None:
-        built = build_sensor(plain, where, [])  # what is wrong with it is reported when the table itself is read
-        if built is not None:
-            from coneskin.scene.values.calibration_file import calibration_keys
+    # what is wrong with the sensor is reported when the table itself is read
+    elif name is not None and (built := build_sensor(plain, where, [])) is not None:
+        from coneskin.scene.values.calibration_file import calibration_keys
 
-            try:
-                needed = {key: table[key] for key in (_NEEDS_CALIBRATION,) if key in table}
-                return {**plain, **needed, **calibration_keys(folder / name, built[0], simulated)}
-            except ValueError as exc:
-                problems.append(f"{where}.calibration: {exc}")
+        try:
+            needed = {key: table[key] for key in (_NEEDS_CALIBRATION,) if key in table}
+            return {**plain, **needed, **calibration_keys(folder / name, built[0], simulated)}
+        except ValueError as exc:
+            problems.append(f"{where}.calibration: {exc}")
     return plain
 
 
