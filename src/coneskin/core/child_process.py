@@ -26,7 +26,6 @@ from typing import TYPE_CHECKING, Any
 
 from .channel import Channel
 from .errors import RobotConnectionError
-from .files import explain_os_error
 
 if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to import
     import subprocess
@@ -50,7 +49,7 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
     import subprocess
 
     command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
-    with explain_os_error(RobotConnectionError, f"cannot start the process {module}"):
+    try:
         if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
             child = subprocess.Popen([*command, "shared"], stdin=subprocess.PIPE)
             assert child.stdin is not None
@@ -71,6 +70,8 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
                     stdin=subprocess.DEVNULL,
                     start_new_session=True,
                 )
+    except OSError as exc:
+        raise RobotConnectionError(f"cannot start the process {module}: {exc.strerror or exc}") from exc
     for end in ends:
         end.close()
     return child
