@@ -20,8 +20,6 @@ _HEARTBEAT_WORDS = {
     "required": "a program on the controller must depend on the guard's heartbeat (coneskin heartbeat)",
     "optional": "NOT REQUIRED: a program without the lines of coneskin heartbeat goes on if the network is cut",
 }
-
-
 #: reaction.bare_side -> what it means
 _BARE_WORDS = {
     "stop": "; not towards what no skin covers",

@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 #: kinds of block without which nothing can be replayed
 _COPIED_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE})
-
-
 #: where a program's own logging gets every event; without a handler of its own nothing is printed
 _EVENT_LOGGER = logging.getLogger("coneskin.events")
 _EVENT_LOGGER.addHandler(logging.NullHandler())

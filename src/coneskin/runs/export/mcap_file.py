@@ -28,6 +28,7 @@ from coneskin.skin.detection.frame.reading import read
 from .tables import wall_clock
 
 if TYPE_CHECKING:
+    from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.driver.values import ControllerState
     from coneskin.runs.replay.run import Run
     from coneskin.scene.build import SensorOnArm
@@ -90,14 +91,16 @@ def _streams(run: Run, progress: Progress) -> list[Iterable[_Message]]:
     """Return the messages of each kind in the order of time, read from the run one after the other."""
     unix, events = wall_clock(run), sorted(run.events, key=lambda event: event.time)
     logs = [_Message("/events", "foxglove.Log", event.time, _log(event, run, unix)) for event in events]
-    streams: list[Iterable[_Message]] = [logs, _levels(run, progress)]
-    streams.append(
-        _Message("/slider", "coneskin.SpeedSlider", time, {"fraction": fraction}) for time, fraction in run.slider()
-    )
-    streams.append(_commands(run))
-    streams.append(_Message("/arm", "coneskin.ArmState", state.time, _joints(state)) for state in run.states())
-    if run.scene().arm is not None:
-        streams += [_drawn_arm(run, unix), _drawn_contacts(run, events, unix)]
+    streams: list[Iterable[_Message]] = [
+        logs,
+        _levels(run, progress),
+        (_Message("/slider", "coneskin.SpeedSlider", time, {"fraction": value}) for time, value in run.slider()),
+        _commands(run),
+        (_Message("/arm", "coneskin.ArmState", state.time, _joints(state)) for state in run.states()),
+    ]
+    if (scene := run.scene()).arm is not None:
+        arm, placed = arm_model(scene.arm.model), run.place_sensors()
+        streams += [_drawn_arm(run, arm, placed, unix), _drawn_contacts(run, arm, placed, events, unix)]
     return streams
 
 
@@ -127,21 +130,12 @@ def _log(event: GuardEvent, run: Run, unix: float) -> dict[str, Any]:
     (line,) = run.timeline([event])
     level = _ERROR if event.name in _ERROR_EVENTS else _WARNING if event.name in _WARNING_EVENTS else _INFO
     text = printable(line.split(" s  ", 1)[-1])
-    return {
-        "timestamp": _stamp(event.time + unix),
-        "level": level,
-        "message": text,
-        "name": event.name.value,
-        "file": "",
-        "line": 0,
-    }
+    said = {"level": level, "message": text, "name": event.name.value, "file": "", "line": 0}
+    return {"timestamp": _stamp(event.time + unix), **said}
 
 
-def _drawn_arm(run: Run, unix: float) -> Iterator[_Message]:
+def _drawn_arm(run: Run, arm: ArmModel, placed: Sequence[SensorOnArm], unix: float) -> Iterator[_Message]:
     """Yield the arm with its sensors."""
-    scene = run.scene()
-    assert scene.arm is not None
-    arm, placed = arm_model(scene.arm.model), run.place_sensors()
     due = -math.inf
     for state in run.states():
         if state.time >= due:
@@ -149,16 +143,14 @@ def _drawn_arm(run: Run, unix: float) -> Iterator[_Message]:
             lines = [_line([*skeleton(arm, state.q)], (0.4, 0.45, 0.5), 0.05)]
             for item in placed:
                 lines += _rings(item, arm, state)
-            yield _Message(
-                "/drawing/arm", "foxglove.SceneUpdate", state.time, _update("arm", state.time + unix, lines=lines)
-            )
+            value = _update("arm", state.time + unix, lines)
+            yield _Message("/drawing/arm", "foxglove.SceneUpdate", state.time, value)
 
 
-def _drawn_contacts(run: Run, events: Sequence[GuardEvent], unix: float) -> Iterator[_Message]:
+def _drawn_contacts(
+    run: Run, arm: ArmModel, placed: Sequence[SensorOnArm], events: Sequence[GuardEvent], unix: float
+) -> Iterator[_Message]:
     """Yield each contact at the moment at which its place was known."""
-    scene = run.scene()
-    assert scene.arm is not None
-    arm, placed = arm_model(scene.arm.model), run.place_sensors()
     by_name = {item.name: item for item in placed}
     for number, event in enumerate(events):
         touched = by_name.get(str(event.details.get("sensor")))
@@ -175,11 +167,11 @@ def _drawn_contacts(run: Run, events: Sequence[GuardEvent], unix: float) -> Iter
             continue
         tip = tuple(p + 0.2 * n for p, n in zip(point, normal, strict=True))
         normal_line = _line([point, tip], (0.9, 0.1, 0.1), 0.008)
-        value = _update(f"contact {number}", event.time + unix, lines=[normal_line], spheres=[_sphere(point)])
+        value = _update(f"contact {number}", event.time + unix, [normal_line], [_sphere(point)])
         yield _Message("/drawing/contacts", "foxglove.SceneUpdate", event.time, value)
 
 
-def _rings(item: SensorOnArm, arm: Any, state: ControllerState) -> list[dict[str, Any]]:
+def _rings(item: SensorOnArm, arm: ArmModel, state: ControllerState) -> list[dict[str, Any]]:
     base_link, frustum = link_pose(arm, state.q, item.link), item.frustum.frustum
     rings = []
     for u in (0.0, 0.5, 1.0):
@@ -239,7 +231,7 @@ def _sphere(point: Any) -> dict[str, Any]:
 
 
 def _update(
-    ident: str, unix: float, lines: list[dict[str, Any]] | None = None, spheres: list[dict[str, Any]] | None = None
+    ident: str, unix: float, lines: list[dict[str, Any]], spheres: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
     entity = {
         "timestamp": _stamp(unix),
@@ -248,8 +240,8 @@ def _update(
         "lifetime": {"sec": 0, "nsec": 0},
         "frame_locked": False,
         "metadata": [],
-        "lines": lines or [],
-        "spheres": spheres or [],
+        "lines": lines,
+        "spheres": list(spheres),
         **{kind: [] for kind in ("arrows", "cubes", "cylinders", "triangles", "texts", "models")},
     }
     return {"deletions": [], "entities": [entity]}
