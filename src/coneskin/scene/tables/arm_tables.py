@@ -88,10 +88,10 @@ def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene |
 
 def read_reaction(tables: Mapping[str, Any], problems: list[str]) -> tuple[Reaction | None, tuple[Rule, ...]]:
     """Return the reaction of a scene, and its rules in order; a rule with a mistake is left out."""
-    from coneskin.robot.reaction.types import Reaction
-
     if "reaction" not in tables:
         return None, ()
+    from coneskin.robot.reaction.types import Reaction
+
     values = _given(check(tables["reaction"], k.REACTION_KEYS, "reaction", problems))
     rows = values.pop("rule", ())
     reaction = Reaction(**values) if "kind" in values else None
