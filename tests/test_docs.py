@@ -48,6 +48,7 @@ LONG |= {
         "permissible-speed",
         "replay",
         "runs",
+        "ur-controller",
     )
 }
 #: blocks that no test runs, each with its reason in the page

@@ -151,8 +151,8 @@ def test_the_fixtures(project: Project) -> None:
         "    stream = cs.TouchStream(skin.sensors)\n"
         "    events = [event for time, data in skin.packets() for event in stream.feed(data, time)]\n"
         "    assert abs(events[0].u - 0.2) < 2e-3\n\n\n"
-        "def test_a_controller(sim_ur):\n"
+        "def test_a_controller(ur_controller):\n"
         "    import socket\n\n"
-        "    socket.create_connection((sim_ur.host, 30004), timeout=5).close()\n"
+        "    socket.create_connection((ur_controller.host, 30004), timeout=5).close()\n"
     )
     assert "3 passed" in project.pytest(code=0)

@@ -182,10 +182,10 @@ def virtual_skin() -> Callable[..., VirtualSkin]:
 
 
 @pytest.fixture
-def sim_ur(request: pytest.FixtureRequest) -> Iterator[SimulatedController]:
-    """Yield a simulated UR controller, a process of its own that ``ur_rtde`` connects to at ``sim_ur.host``.
+def ur_controller(request: pytest.FixtureRequest) -> Iterator[SimulatedController]:
+    """Yield a simulated UR controller, a process of its own that ``ur_rtde`` connects to at ``ur_controller.host``.
 
-    Its arguments: ``@pytest.mark.parametrize("sim_ur", [{"model": "UR10e"}], indirect=True)``.
+    Its arguments: ``@pytest.mark.parametrize("ur_controller", [{"model": "UR10e"}], indirect=True)``.
     """
     from coneskin.robot.sim.process import SimulatedController, free_host
 

@@ -18,8 +18,9 @@ from coneskin.core.errors import RobotConnectionError, RobotTimeout
 from coneskin.robot.sim import command, server
 from coneskin.robot.sim.command import main
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.states import Options
+from coneskin.robot.sim.machine.states import PORTS, Options
 from coneskin.robot.sim.process import SimulatedController, free_host
+from tests.support.paths import ROOT
 
 COMMAND = [sys.executable, "-m", "coneskin.robot.sim.command"]
 PROC = Path("/proc")
@@ -60,6 +61,26 @@ def test_two_arms_run_side_by_side_and_end_with_their_context() -> None:
         pids = [one.pid, two.pid]
         one.freeze()  # one that is frozen when its context ends must end too
     assert all(ends(pid) for pid in pids)
+
+
+def test_it_needs_the_standard_library_alone() -> None:
+    """With -S no installed package can be imported, and a program still runs."""
+    host = free_host()
+    words = [sys.executable, "-S", "-m", "coneskin", "sim-ur", "--host", host, "--json"]
+    environment = {"PATH": "", "PYTHONPATH": str(ROOT / "src")}
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        assert json.loads(process.stdout.readline())["ready"]
+        long = "# what makes it a program that another process translates\n" * 100
+        with socket.create_connection((host, PORTS["secondary"]), 60.0) as script:
+            script.sendall(f"def p():\n{long}interpreter_mode()\nend\n".encode())
+            with socket.create_connection((host, PORTS["interpreter"]), 60.0) as line:
+                reply = b"discard"
+                while reply.startswith(b"discard"):
+                    line.sendall(b"get_inverse_kin(get_actual_tcp_pose())\n")
+                    reply = line.recv(999)
+        process.terminate()
+    assert reply.startswith(b"ack: 1: get_inverse_kin")
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
