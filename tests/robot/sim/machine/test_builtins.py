@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -168,7 +169,13 @@ def page_table() -> str:
     """The page's list of functions, as this table has them."""
     lines = ["| subject | functions |", "|---|---|"]
     for subject, examples in EXAMPLES.items():
-        lines.append(f"| {subject} | {' '.join(f'`{name}`' for name in sorted(examples.keys() - NO_EFFECT))} |")
+        names = sorted(examples.keys() - NO_EFFECT)
+        if subject.startswith("not there"):  # groups of names with the same beginning
+            for group in ("encoder", "modbus", "path", "set_runstate"):
+                names = sorted({f"{group}_*" if name.startswith(f"{group}_") else name for name in names})
+            beginnings = Counter(name.rpartition("_")[0] for name in names)
+            names = sorted({f"{w}_*" if beginnings[w := name.rpartition("_")[0]] > 1 else name for name in names})
+        lines.append(f"| {subject} | {' '.join(f'`{name}`' for name in names)} |")
     lines.append(f"| accepted, without an effect | {' '.join(f'`{name}`' for name in sorted(NO_EFFECT))} |")
     return "\n".join(lines)
 
