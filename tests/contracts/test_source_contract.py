@@ -112,13 +112,13 @@ def test_a_right_source_in_memory_keeps_it(check: Callable[[OpenLineFactory], No
 @pytest.mark.parametrize(
     ("kind", "first"),
     [
-        (_LosesAByte, "check_bytes_arrive_as_they_were_sent"),
-        (_DropsWhatIsNoFrame, "check_a_cut_frame_costs_that_frame_only"),
-        (_NeverWakes, "check_the_descriptor_is_readable_when_bytes_come"),
-        (_GoneWhenSilent, "check_silence_is_a_timeout_that_leaves_it_open"),
-        (_SilentWhenGone, "check_unplugged_is_an_error_and_stays_one"),
-        (_ReadsWhenClosed, "check_closing_twice_is_fine_and_reading_then_is_not"),
-        (_KeepsADescriptor, "check_closing_twice_is_fine_and_reading_then_is_not"),
+        (_LosesAByte, "_bytes_arrive_as_they_were_sent"),
+        (_DropsWhatIsNoFrame, "_a_cut_frame_costs_that_frame_only"),
+        (_NeverWakes, "_the_descriptor_is_readable_when_bytes_come"),
+        (_GoneWhenSilent, "_silence_is_a_timeout_that_leaves_it_open"),
+        (_SilentWhenGone, "_unplugged_is_an_error_and_stays_one"),
+        (_ReadsWhenClosed, "_closing_twice_is_fine_and_reading_then_is_not"),
+        (_KeepsADescriptor, "_closing_twice_is_fine_and_reading_then_is_not"),
     ],
 )
 def test_each_way_to_break_it_is_noticed(kind: type[_Memory], first: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ def contract_bytes(frame_length: int = FRAME_LENGTH) -> bytes:
     return b"".join(encode(frame) for _, frame in skin.frames())
 
 
-def check_bytes_arrive_as_they_were_sent(open_line: OpenLineFactory) -> None:
+def _bytes_arrive_as_they_were_sent(open_line: OpenLineFactory) -> None:
     """Check that no byte is lost, added or changed, in a frame of any length."""
     for length in FRAME_LENGTHS:
         sent = contract_bytes(length)
@@ -82,7 +82,7 @@ def check_bytes_arrive_as_they_were_sent(open_line: OpenLineFactory) -> None:
             assert line.read(len(sent)) == sent
 
 
-def check_a_touch_arrives(open_line: OpenLineFactory) -> None:
+def _a_touch_arrives(open_line: OpenLineFactory) -> None:
     """Check that a detector sees the touch where it is."""
     sent = contract_bytes()
     stream = TouchStream([_TOUCHED_SENSOR])
@@ -93,7 +93,7 @@ def check_a_touch_arrives(open_line: OpenLineFactory) -> None:
     assert stream.decoder.frames == _FRAME_COUNT
 
 
-def check_a_cut_frame_costs_that_frame_only(open_line: OpenLineFactory) -> None:
+def _a_cut_frame_costs_that_frame_only(open_line: OpenLineFactory) -> None:
     """Check that bytes which are no frame do no harm to the frames around them, and arrive as well."""
     whole = contract_bytes()
     sent = whole[: 5 * FRAME_LENGTH + 10] + whole[6 * FRAME_LENGTH :]
@@ -104,7 +104,7 @@ def check_a_cut_frame_costs_that_frame_only(open_line: OpenLineFactory) -> None:
     assert numbers == [number for number in range(_FRAME_COUNT) if number != 5]
 
 
-def check_the_descriptor_is_readable_when_bytes_come(open_line: OpenLineFactory) -> None:
+def _the_descriptor_is_readable_when_bytes_come(open_line: OpenLineFactory) -> None:
     """Check that what a guard waits on wakes it; a source without a descriptor is asked again and again instead."""
     with open_line(contract_bytes()) as line:
         descriptor = line.source.fileno()
@@ -113,7 +113,7 @@ def check_the_descriptor_is_readable_when_bytes_come(open_line: OpenLineFactory)
         assert line.source.read(_LINE_TIMEOUT)
 
 
-def check_silence_is_a_timeout_that_leaves_it_open(open_line: OpenLineFactory) -> None:
+def _silence_is_a_timeout_that_leaves_it_open(open_line: OpenLineFactory) -> None:
     """Check that nothing to read is a SkinTimeout, again and again, and no end."""
     sent = contract_bytes()[:360]
     with open_line(sent) as line:
@@ -128,7 +128,7 @@ def check_silence_is_a_timeout_that_leaves_it_open(open_line: OpenLineFactory) -
             raise AssertionError("a silent source must raise SkinTimeout")
 
 
-def check_unplugged_is_an_error_and_stays_one(open_line: OpenLineFactory) -> None:
+def _unplugged_is_an_error_and_stays_one(open_line: OpenLineFactory) -> None:
     """Check that a line that is gone raises SkinConnectionError: an end of bytes must never look like silence."""
     sent = contract_bytes()[:360]
     with open_line(sent) as line:
@@ -147,7 +147,7 @@ def check_unplugged_is_an_error_and_stays_one(open_line: OpenLineFactory) -> Non
             raise AssertionError("a source that is gone must raise SkinConnectionError")
 
 
-def check_closing_twice_is_fine_and_reading_then_is_not(open_line: OpenLineFactory) -> None:
+def _closing_twice_is_fine_and_reading_then_is_not(open_line: OpenLineFactory) -> None:
     """Check that a closed source has no descriptor and refuses to read."""
     with open_line(contract_bytes()[:360]) as line:
         line.source.close()
@@ -162,11 +162,11 @@ def check_closing_twice_is_fine_and_reading_then_is_not(open_line: OpenLineFacto
 
 #: Every check, in the order in which a source is written.
 SOURCE_CHECKS: tuple[Callable[[OpenLineFactory], None], ...] = (
-    check_bytes_arrive_as_they_were_sent,
-    check_a_touch_arrives,
-    check_a_cut_frame_costs_that_frame_only,
-    check_the_descriptor_is_readable_when_bytes_come,
-    check_silence_is_a_timeout_that_leaves_it_open,
-    check_unplugged_is_an_error_and_stays_one,
-    check_closing_twice_is_fine_and_reading_then_is_not,
+    _bytes_arrive_as_they_were_sent,
+    _a_touch_arrives,
+    _a_cut_frame_costs_that_frame_only,
+    _the_descriptor_is_readable_when_bytes_come,
+    _silence_is_a_timeout_that_leaves_it_open,
+    _unplugged_is_an_error_and_stays_one,
+    _closing_twice_is_fine_and_reading_then_is_not,
 )
