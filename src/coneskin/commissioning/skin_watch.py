@@ -37,7 +37,7 @@ class SkinWatch:
 
     Args:
         scene: with the sensors.
-        source: of their bytes, open.
+        source: of their bytes, opened once the watch is there.
     """
 
     def __init__(self, scene: Scene, source: Source) -> None:
@@ -148,12 +148,12 @@ def check_touchable(scene: Scene, simulated: bool) -> None:
         raise SkinConnectionError(f"the skin of {scene.name} is virtual, and nobody can touch it: use --simulated")
 
 
-def open_skin(scene: Scene, stack: ExitStack, played_as: Scene | None) -> tuple[Source, SkinClient | None]:
-    """Open the source of a scene's skin; it is closed with the stack.
+def skin_source(scene: Scene, stack: ExitStack, played_as: Scene | None) -> tuple[Source, SkinClient | None]:
+    """Return the source of a scene's skin, not open yet: what it sends before it is read would be lost.
 
     Args:
         scene: with a source.
-        stack: that closes it.
+        stack: that ends the process.
         played_as: scene whose virtual skin, without its script of touches, is to send the bytes, from a process that
             ends with the stack; None for a real skin.
 
@@ -171,7 +171,7 @@ def open_skin(scene: Scene, stack: ExitStack, played_as: Scene | None) -> tuple[
         stack.callback(client.process.wait, 10.0)
         stack.callback(client.channel.close)
         port = client.port()
-    return stack.enter_context(open_source(scene.source.kind, scene.source.settings, port)), client
+    return open_source(scene.source.kind, scene.source.settings, port), client
 
 
 class TouchSession:
@@ -214,8 +214,9 @@ class TouchSession:
             SkinError: the skin has a fault, or cannot be read.
         """
         with ExitStack() as stack:
-            source, self._client = open_skin(self.scene, stack, self._wired_as if self.simulated else None)
+            source, self._client = skin_source(self.scene, stack, self._wired_as if self.simulated else None)
             watch = SkinWatch(self.scene, source)
+            stack.enter_context(source)
             watch.await_ready()
             yield watch
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from coneskin.commissioning.line.port_search import port_group
-from coneskin.commissioning.skin_watch import open_skin
+from coneskin.commissioning.skin_watch import skin_source
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
 from coneskin.scene.required_packages import missing_packages, required_packages
@@ -120,7 +120,8 @@ class Doctor:
         self.note(*_port(source))
         with ExitStack() as stack:
             try:
-                opened, client = open_skin(scene, stack, scene if is_simulated(source.kind) else None)
+                opened, client = skin_source(scene, stack, scene if is_simulated(source.kind) else None)
+                stack.enter_context(opened)
             except ConeSkinError as exc:
                 self.note(Finding("skin, port", "bad", str(exc), "it can be opened"))
                 self.note(*(Finding(item, "not tried", "no port") for item in ("skin, frames", "skin, wires")))
