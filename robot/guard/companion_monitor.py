@@ -80,6 +80,12 @@ _HELD_UP_WORDS = (
 )
 _LOOK_TIME: Final = 3.0 * BEAT_PERIOD  # s for which it counts that a process was seen waiting
 _RESTART_TIMEOUT: Final = 5.0  # s for the driver's program to run again after an announced end
+#: channel of a helper -> what it is
+HELPER_NAMES: Final[Mapping[str, str]] = {
+    "driver": "the driver process",
+    "watchdog": "the guard watchdog",
+    "second": "the second guard watchdog",
+}
 #: process that can be lost -> the stop path that goes with it; the driver knows those of its connections
 _LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
     "driver": frozenset({StopPath.DRIVER}),
@@ -97,8 +103,11 @@ class CompanionMonitor:
 
     def __init__(self, limits: MonitoringLimits, arm: ArmSupervisor | None) -> None:
         self._arm = arm
-        self._helper = "the guard watchdog" if arm is None or not arm.internal_control else "the driver process"
-        silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence, self._helper: limits.process_silence}
+        silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence}
+        self._helper = "driver" if arm is not None and arm.internal_control else "watchdog"
+        if arm is not None:
+            helpers = ("driver",) if arm.internal_control else ("watchdog", "second")
+            silences |= {HELPER_NAMES[name]: limits.process_silence for name in helpers}
         self._heartbeats = _Heartbeats(silences)
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
@@ -116,22 +125,24 @@ class CompanionMonitor:
         if not suspended:
             self._heartbeats.feed(_USER_PROGRAM, now)
 
-    def hear_helper(self, now: float) -> None:
-        """Note a message of the driver process, or of the guard watchdog, at a host time [s]."""
-        self._heartbeats.feed(self._helper, now)
+    def hear_helper(self, now: float, second: bool = False) -> None:
+        """Note a message of the driver process, or of a guard watchdog, the ``second`` or not, at a host time [s]."""
+        self._heartbeats.feed(HELPER_NAMES["second" if second else self._helper], now)
 
-    def hold_up_helper(self, now: float, load: str) -> str:
-        """Note that this computer does not let the driver process, or the guard watchdog, run at a host time [s].
+    def hold_up_helper(self, now: float, load: str, name: str) -> str:
+        """Note that this computer does not let the driver process, or a guard watchdog, run at a host time [s].
 
         Args:
             now: host time [s].
             load: how busy the computer is, in words.
+            name: of the process, one of ``HELPER_NAMES``.
 
         Returns:
             a remark for people. Empty after the first since it was heard.
         """
-        new = self._heartbeats.hold_up(self._helper, now, _HELD_UP_WORDS % load)
-        return f"{self._helper} waits for a processor ({load}): it may do so for {HOLD_UP_LIMIT:g} s" if new else ""
+        process = HELPER_NAMES.get(name, HELPER_NAMES[self._helper])
+        new = self._heartbeats.hold_up(process, now, _HELD_UP_WORDS % load)
+        return f"{process} waits for a processor ({load}): it may do so for {HOLD_UP_LIMIT:g} s" if new else ""
 
     def doubt_driver(self, now: float) -> None:
         """Let the stop under way not count on the driver process, which has reported an error."""
@@ -143,9 +154,9 @@ class CompanionMonitor:
         arm = self._arm
         if arm is None:
             return
-        if what in _LOST_WITH_PROCESS:
-            arm.backup_ready = False
-            self._heartbeats.forget(self._helper)
+        if what in HELPER_NAMES:
+            arm.backup_ready = arm.backup_ready and what == "second"
+            self._heartbeats.forget(HELPER_NAMES[what])
         arm.lose(_LOST_WITH_PROCESS.get(what) or arm.driver.lost_with.get(what, frozenset()), now)
 
     def restart(self, now: float, over: bool) -> None:
@@ -192,10 +203,9 @@ class CompanionMonitor:
         before, self._silent = self._silent, self._heartbeats.silent(now)
         if not self._silent:
             return []
-        internal = self._arm is not None and self._arm.internal_control
-        helper = _LOST_WITH_PROCESS["driver" if internal else "watchdog"]
+        helper = HELPER_NAMES[self._helper]
         return [
-            (why, helper if process == self._helper else frozenset())
+            (why, _LOST_WITH_PROCESS[self._helper] if process == helper else frozenset())
             for process, why in self._silent.items()
             if process not in before
         ]

@@ -295,11 +295,11 @@ class GuardCore:
     # ---- processes and ports
 
     def _feed_report(self, block: Block, out: Outputs) -> None:
-        """Take a report of the driver process, or of the guard watchdog."""
+        """Take a report of the driver process, or of a guard watchdog."""
         if self._arm is None:
             return
         report = StatusReport.decode(block.payload)
-        self._companions.hear_helper(block.time)
+        self._companions.hear_helper(block.time, second=report.text == "second")
         match report.kind:
             case "ready":
                 self._arm.backup_ready = True
@@ -318,10 +318,10 @@ class GuardCore:
         self._companions.hear_program(block.time, suspended=bool(block.payload))
 
     def _feed_hold_up(self, block: Block, out: Outputs) -> None:
-        """Take that this computer does not let the driver process, or the guard watchdog, run."""
-        load = block.payload.decode("ascii", "replace")
-        if what := self._companions.hold_up_helper(block.time, load):
-            self._folding.emit(out, EventName.MESSAGE, "held up", block.time, what=what)
+        """Take that this computer does not let the driver process, or a guard watchdog, run."""
+        load, _, name = block.payload.decode("ascii", "replace").partition("\n")
+        if what := self._companions.hold_up_helper(block.time, load, name):
+            self._folding.emit(out, EventName.MESSAGE, f"held up {name}", block.time, what=what)
 
     def _lose(self, block: Block, out: Outputs) -> None:
         """Take that a port is gone: the arm stops."""

@@ -25,6 +25,7 @@ from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, Setpo
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
 
+from .companion_monitor import HELPER_NAMES
 from .controller_heartbeat import heartbeat_count
 from .core import GuardCore
 from .phase import Phase
@@ -46,13 +47,13 @@ class GuardPorts:
         stops: connections for stops that do not need the driver process, open.
         slider: of the controller's speed, open.
         watchdog: the guard watchdog, where another program moves the arm.
-        second: the second one, which is only told that the guard lives.
+        second: the second one, which is told that the guard lives, and only says that it does.
         heartbeat: writer of the count that the controller's own watchdog waits for, open.
         setpoints: the reader once more, where it carries setpoints.
         reopen: begins to open a source that is gone again. None where it is gone for good.
         absent: connection of a stop path that the guard does without -> why.
         program: the process that guards, where it can be watched.
-        helper: that of driver or watchdog, likewise.
+        helpers: those of driver or watchdogs, likewise, by the names here.
     """
 
     session: Channel
@@ -68,7 +69,7 @@ class GuardPorts:
     reopen: Callable[[Source], SourceReopening] | None = None
     absent: Mapping[str, str] = field(default_factory=dict)
     program: ProcessWatch | None = None
-    helper: ProcessWatch | None = None
+    helpers: Mapping[str, ProcessWatch] = field(default_factory=dict)
 
 
 class _Outbox:
@@ -177,7 +178,7 @@ class GuardLoop:
         self._quit = False
         self._fed = False  # anything, in this step
         self._beat = -BEAT_PERIOD
-        self._helper_heard = clock()
+        self._heard = dict.fromkeys(ports.helpers, clock())
         self._asked = self._clock()  # when the controller was last asked whether it takes stops
         self._count = 0  # sent last
         self._out: list[bytes] = []
@@ -276,10 +277,8 @@ class GuardLoop:
             self._read_channel(ports.driver, "driver")
         if ready & _WATCHDOG:
             self._read_channel(ports.watchdog, "watchdog")
-        if ready & _SECOND and ports.second is not None:
-            ports.second.receive()
-            if ports.second.closed:
-                self._lose("second", "the second guard watchdog has ended", ports.second)
+        if ready & _SECOND:
+            self._read_channel(ports.second, "second")
         for state in states:
             self._feed(BlockKind.ARM, state)
         if ready & _SLIDER:
@@ -332,11 +331,11 @@ class GuardLoop:
         if channel is None:  # lost in this round
             return
         for message in channel.receive():
-            self._helper_heard = self._clock()
-            self._feed(BlockKind.DRIVER, message)
+            self._heard[name] = self._clock()
+            if name != "second" or message.startswith(b"alive"):
+                self._feed(BlockKind.DRIVER, message)
         if channel.closed:
-            what = "the driver process" if name == "driver" else "the guard watchdog"
-            self._lose(name, f"{what} has ended", channel)
+            self._lose(name, f"{HELPER_NAMES[name]} has ended", channel)
 
     def _send_heartbeat(self, now: float) -> None:
         self._beat = now
@@ -349,11 +348,12 @@ class GuardLoop:
 
     def _look_at_processes(self) -> None:
         """Tell the core whether the program is suspended, and whether a helper that is late waits for a processor."""
-        program, helper = self._ports.program, self._ports.helper
+        program = self._ports.program
         if program is not None:
             self._feed(BlockKind.PROGRAM, b"suspended" if program.suspended() else b"")
-        if helper is not None and self._beat - self._helper_heard > _LATE_TIME and helper.waits(self._beat):
-            self._feed(BlockKind.HELD_UP, load().encode())
+        for name, helper in self._ports.helpers.items():
+            if self._beat - self._heard[name] > _LATE_TIME and helper.waits(self._beat):
+                self._feed(BlockKind.HELD_UP, f"{load()}\n{name}".encode())
 
     def _read_skin(self, source: Source) -> None:
         try:

@@ -105,10 +105,11 @@ class CompanionProcesses:
     Attributes:
         program_is_mute: True where the program is suspended.
         process_is_mute: True where driver process or guard watchdog sends nothing.
+        second_is_mute: the same of the second guard watchdog.
     """
 
     def __init__(self) -> None:
-        self.program_is_mute = self.process_is_mute = False
+        self.program_is_mute = self.process_is_mute = self.second_is_mute = False
         self._ready = False
         self._due = 0.0
         self._release: Release | None = None
@@ -128,6 +129,8 @@ class CompanionProcesses:
             self._due = now + _REPORT_PERIOD
         if due:
             yield Block(BlockKind.PROGRAM, now, b"suspended" if self.program_is_mute else b"")
+        if due and not self.second_is_mute:
+            yield _report(now, "alive", "second")
         if self.process_is_mute:
             return
         if not self._ready:

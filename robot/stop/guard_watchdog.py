@@ -46,7 +46,7 @@ class _GuardWatchdog:
         guard: the guard's channel.
         session: the guarded program's channel; it ends, or says ``LEAVE``, when the program leaves.
         hold: of the arm.
-        patience: for which the guard may be silent [s].
+        second: True for the one that waits longer.
         clock: monotonic seconds.
     """
 
@@ -55,13 +55,14 @@ class _GuardWatchdog:
         guard: Channel,
         session: Channel,
         hold: StandstillHold,
-        patience: float = GUARD_SILENCE,
+        second: bool = False,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._guard = guard
         self._session = session
         self._hold = hold
-        self._patience = patience
+        self._patience = UNGUARDED_TIME if second else GUARD_SILENCE
+        self._sign = StatusReport("alive", "second" if second else "").encode()
         self._left = False  # the guarded program
         self._ended = False  # the guard, in order
         self._asked: StopProgram | None = None  # a stop that waits for the one under way
@@ -116,7 +117,7 @@ class _GuardWatchdog:
         """Send a heartbeat where one is due at a time [s]."""
         if now - self._beaten >= BEAT_PERIOD:
             self._beaten = now
-            self._guard.send(StatusReport("alive").encode())
+            self._guard.send(self._sign)
 
 
 def main(arguments: list[str]) -> int:
@@ -141,8 +142,7 @@ def main(arguments: list[str]) -> int:
             stack.callback(hold.close)
             lifeline.hold()
             guard.send(StatusReport("ready").encode())
-            patience = UNGUARDED_TIME if second else GUARD_SILENCE
-            _GuardWatchdog(guard, session, hold, patience).run()
+            _GuardWatchdog(guard, session, hold, second).run()
     except ConeSkinError as exc:
         guard.send(StatusReport("error", str(exc)).encode())
         return 1

@@ -295,6 +295,19 @@ def test_without_both_the_guarding_program_stops_the_arm(controller, run, number
             kill(session, name, signal.SIGCONT)
 
 
+@pytest.mark.promise("P40")
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["watchdog", "second"])
+def test_a_watchdog_that_is_frozen_is_missed(controller, run, name):
+    with guard(external(controller)) as session:
+        run("raw URScript")
+        kill(session, name, signal.SIGSTOP)
+        latched = session.wait_for(("latched",), DEADLINE)
+        assert ("second" in latched.details["why"]) == (name == "second")
+        controller.wait_for_standstill()
+        kill(session, name, signal.SIGCONT)
+
+
 @pytest.mark.long
 def test_without_its_watchdog_the_guard_stops_the_arm_and_does_not_arm_again(controller, run):
     with guard(external(controller)) as session:

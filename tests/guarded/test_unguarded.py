@@ -170,7 +170,7 @@ def stop_by(host, numbers):
     """The second watchdog of a guard that is gone, alone with a controller that says nothing."""
     ports, ends = Ports(host, numbers), []
     scene, processes = scene_for(type("Host", (), {"host": host}), control="external"), ChildProcesses()
-    session = processes._start_helper("second watchdog", "coneskin.robot.stop.guard_watchdog", scene, ends)
+    session = processes._start_helper("second", "coneskin.robot.stop.guard_watchdog", scene, ends)
     guard = Channel(ends[0])
     try:
         until(lambda: guard.receive() != [])
@@ -181,9 +181,9 @@ def stop_by(host, numbers):
         seen = len(ports.got[port])
         until(lambda: len(ports.got[port]) > seen)  # and again, now and then
         session.send(LEAVE)
-        assert processes.children["second watchdog"].wait(DEADLINE) == 0  # it gives up: nobody can say that it stands
+        assert processes.children["second"].wait(DEADLINE) == 0  # it gives up: nobody can say that it stands
         assert [decode_json(message) for message in session.receive()] == [{"stands": False}]
     finally:
         session.close()
-        processes.children["second watchdog"].wait()
+        processes.children["second"].wait()
         ports.close()

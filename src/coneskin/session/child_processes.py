@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from .skin_client import SkinClient
 
-_WATCHDOG_NAMES = ("watchdog", "second watchdog")
+_WATCHDOG_NAMES = ("watchdog", "second")
 _END_TIMEOUT = 6.0  # s for the guard to stop the arm and end
 
 
@@ -32,7 +32,7 @@ class ChildProcesses:
     """Child processes of one session, started once and ended once.
 
     Attributes:
-        children: by name: "guard", "driver" or "watchdog" and "second watchdog", "skin".
+        children: by name: "guard", "driver" or "watchdog" and "second", "skin".
         guard: channel to the guard; None before the start.
         program: channel to the driver process, for the guarded program; None with external control.
         watchdogs: channels to the guard watchdogs.
@@ -84,8 +84,8 @@ class ChildProcesses:
         self.guard = Channel(ours)
         self.children["guard"] = spawn("coneskin.session.guard_process", *ends)
         port = "" if self.skin is None else self.skin.port()  # the others start meanwhile
-        helper = self.children.get("driver") or self.children.get("watchdog")
-        self.guard.send(encode_json({**start, "port": port, "helper": 0 if helper is None else helper.pid}))
+        helpers = {name: self.children[name].pid for name in ("driver", *_WATCHDOG_NAMES) if name in self.children}
+        self.guard.send(encode_json({**start, "port": port, "helpers": helpers}))
         return self.guard
 
     def _start_helper(self, name: str, module: str, scene: Scene, ends: list[socket.socket]) -> Channel:

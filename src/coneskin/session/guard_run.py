@@ -115,7 +115,8 @@ def run_guard(
             (ports.driver,) = others
         else:
             ports.watchdog, ports.second = others
-        ports.program, ports.helper = ProcessWatch(os.getppid()), ProcessWatch(int(start["helper"]))
+        ports.program = ProcessWatch(os.getppid())
+        ports.helpers = {name: ProcessWatch(pid) for name, pid in start["helpers"].items()}
         arm, needs = arm_model(scene.arm.model), core.needs
         driver, host = load_driver(arm.family), scene.arm.host
         stack.enter_context(_arm_lock(host))

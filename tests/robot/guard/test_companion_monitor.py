@@ -120,6 +120,24 @@ def test_a_process_that_waits_for_a_processor_is_no_fault_for_half_a_second(exte
 
 
 @pytest.mark.promise("P40")
+@pytest.mark.parametrize("waits", [False, True])
+def test_the_second_guard_watchdog_is_missed_too_though_the_first_one_lives(waits):
+    rig = GuardRig(speed=1.0, external=True).run(0.5)
+    rig.companions.second_is_mute = True
+    since = rig.now
+    while rig.core.phase is Phase.ACTIVE and rig.now < since + 1.0:
+        if waits:
+            rig.feed(BlockKind.HELD_UP, b"load 9.0 on 2 cores\nsecond")
+        rig.run(0.03)
+    low, high = (0.47, 0.56) if waits else (0.17, 0.25)
+    assert low < stopping_time(rig, since) < high
+    assert "the second guard watchdog: no heartbeat" in rig.event("stopping").details["why"]
+    rig.run(1.5)
+    rig.reset()
+    assert "the second guard watchdog" in str(rig.event("refused").details["reasons"])
+
+
+@pytest.mark.promise("P40")
 def test_a_process_that_got_a_processor_and_hangs_has_no_more_time_than_any_other():
     rig = GuardRig(speed=1.0).run(0.5)
     rig.companions.process_is_mute = True

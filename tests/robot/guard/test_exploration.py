@@ -9,7 +9,7 @@ from coneskin.runs.replay.run import read_run
 from tests.support.exploration.breaks import BREAKS, broken, find
 from tests.support.exploration.explorer import explore, follow
 from tests.support.exploration.guard_world import INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
-from tests.support.exploration.process_world import Parts, ProcessWorld
+from tests.support.exploration.process_world import HEEDLESS_PROGRAM, PATIENT_CONTROLLER, Parts, ProcessWorld
 
 #: CI's share; `python -m bench exploration` explores every reaction with each control
 _EXPLORED = [("stop", "internal")]
@@ -47,24 +47,46 @@ def test_from_a_slider_that_a_stop_has_put_to_0_a_person_gets_back_to_active() -
 
 
 @pytest.mark.long
-def test_no_silence_of_a_process_is_left_alone() -> None:
-    found = explore(ProcessWorld("internal"), PROGRESS)
+@pytest.mark.parametrize(
+    ("control", "parts", "most_wrong"),
+    [("internal", {}, 2), ("external", HEEDLESS_PROGRAM, 1), ("external", {}, 1)],
+)
+def test_no_silence_of_a_process_is_left_alone(control: str, parts: dict[str, float], most_wrong: int) -> None:
+    found = explore(ProcessWorld(control, Parts(**parts), most_wrong), PROGRESS)
+    assert found.broken == {}
+    assert found.closed
+
+
+@pytest.mark.long
+def test_of_two_processes_that_fall_silent_at_once_neither_is_left_alone() -> None:
+    found = explore(ProcessWorld("external", Parts(**HEEDLESS_PROGRAM), without=("lose", "touch", "thaw")))
     assert found.broken == {}
     assert found.closed
 
 
 @pytest.mark.parametrize(
-    ("control", "part"),
+    ("control", "base", "part", "becomes", "breaks"),
     [
-        ("internal", "program_silence"),
-        ("internal", "watchdog"),
-        ("external", "process_silence"),
-        ("external", "second_silence"),
+        ("internal", {}, "program_silence", math.inf, "frozen"),
+        ("internal", {}, "guard_silence", math.inf, "unguarded"),
+        ("internal", {}, "watchdog", math.inf, "cut"),
+        ("internal", PATIENT_CONTROLLER, "process_silence", math.inf, "frozen"),
+        ("internal", PATIENT_CONTROLLER, "hold_up", math.inf, "frozen"),
+        ("internal", PATIENT_CONTROLLER, "hold_up", 0.0, "held up"),
+        ("external", HEEDLESS_PROGRAM, "program_silence", math.inf, "frozen"),
+        ("external", HEEDLESS_PROGRAM, "process_silence", math.inf, "frozen"),
+        ("external", HEEDLESS_PROGRAM, "hold_up", math.inf, "frozen"),
+        ("external", HEEDLESS_PROGRAM, "hold_up", 0.0, "held up"),
+        ("external", HEEDLESS_PROGRAM, "guard_silence", math.inf, "unguarded"),
+        ("external", HEEDLESS_PROGRAM, "second_silence", math.inf, "unguarded"),
     ],
 )
-def test_without_one_who_listens_the_arm_moves_on(control: str, part: str) -> None:
-    found = explore(ProcessWorld(control, Parts(**{part: math.inf})), stop_at_first=True)
-    assert found.broken
+def test_without_one_who_listens_the_arm_moves_on(
+    control: str, base: dict[str, float], part: str, becomes: float, breaks: str
+) -> None:
+    without = ("lose", "touch", "reset", "thaw", "restart", "kill")
+    world = ProcessWorld(control, Parts(**{**base, part: becomes}), without=without)
+    assert breaks in explore(world, stop_at_first=True).broken
 
 
 @pytest.mark.pure

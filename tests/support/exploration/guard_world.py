@@ -188,6 +188,7 @@ class _Wrong:
     unpowered: bool = False
     program: bool = False  # silent
     process: bool = False
+    second: bool = False  # guard watchdog, silent
     disobeys: str = ""  # "first" path, or "all"
     lost: tuple[str, ...] = ()  # connections and processes, for good
     ended: bool = False
@@ -199,7 +200,8 @@ class _Wrong:
     def count(self) -> int:
         """Return how many things are wrong."""
         touches = (self.skin != "free") + (self.other != "free")
-        broken = bool(self.line) + bool(self.states) + self.safety + self.unpowered + self.program + self.process
+        silent = self.program + self.process + self.second
+        broken = bool(self.line) + bool(self.states) + self.safety + self.unpowered + silent
         return touches + broken + bool(self.disobeys) + len(self.lost) + self.ended
 
 
@@ -326,7 +328,8 @@ class GuardWorld:
             found += ["states mute", "states frozen", "states lost"]
         if not wrong.states:
             found += ["clock steps back", "clock steps ahead", "a state is nonsense"]
-        for name in ("safety", "unpowered", "program", "process"):
+        external = self.settings.control == "external"
+        for name in ("safety", "unpowered", "program", "process", *(("second",) if external else ())):
             if getattr(wrong, name):
                 found.append(f"mend {name}")
             elif more:
@@ -338,8 +341,8 @@ class GuardWorld:
         elif more:
             found += ["first path fails", "all paths fail"]
         if more:
-            process = "driver" if self.settings.control == "internal" else "watchdog"
-            found += [f"lose {what}" for what in ("program", "command", "slider", process)]
+            processes = ("watchdog", "second") if external else ("driver",)
+            found += [f"lose {what}" for what in ("program", "command", "slider", *processes)]
             found += ["the session ends"]
         if "driver" not in wrong.lost and "watchdog" not in wrong.lost:
             found.append("the process reports an error")
@@ -477,6 +480,7 @@ class GuardWorld:
         self._cycles += 1
         self.companions.program_is_mute = wrong.program or wrong.ended
         self.companions.process_is_mute = wrong.process or bool({"driver", "watchdog"} & set(wrong.lost))
+        self.companions.second_is_mute = wrong.second or "second" in wrong.lost
         for block in list(self.companions.blocks(self.now)):
             if block.kind == BlockKind.DRIVER and block.payload.startswith(b"released"):
                 self._judge.acknowledged = int(block.payload.split(b"\n")[1])
@@ -645,7 +649,7 @@ class GuardWorld:
             return f"the states are {wrong.states}"
         if wrong.safety or wrong.unpowered:
             return "the controller has stopped the arm"
-        if wrong.program or wrong.process or wrong.lost:
+        if wrong.program or wrong.process or wrong.second or wrong.lost:
             return "a process or a connection is gone"
         return ""
 
@@ -655,7 +659,13 @@ class GuardWorld:
         fault = self._fault()
         if fault != judge.fault:
             judge.fault, judge.fault_since = fault, now if fault else math.inf
-        limit = _LIMITS["process"] if self.wrong.process else _LIMITS["program"] if self.wrong.program else 0.05
+        limit = (
+            _LIMITS["process"]
+            if self.wrong.process or self.wrong.second
+            else _LIMITS["program"]
+            if self.wrong.program
+            else 0.05
+        )
         if (
             fault
             and phase in (Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING)

@@ -15,7 +15,6 @@ from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, UNGUARD
 from coneskin.robot.stop.limits import MonitoringLimits
 
 _TICK = 0.05  # s; no limit is finer
-_MOST_WRONG = 2  # processes or lines at once, beside lost beats
 _MOST_LOST = 2  # beats of one line in a row that may be lost while nobody needs to stop
 _STOP_TICKS = 1  # in which an arm that was told to has stopped
 
@@ -44,6 +43,7 @@ class Parts:
         second_silence: the same, as the second watchdog hears it, with external control [s].
         watchdog: after which the controller ends a program that hears nothing [s]: with internal control that of the
             driver process, with external control one with the lines of ``coneskin heartbeat``.
+        watchdog_period: 1 / ``watchdog_hz`` of the scene, which that is meant to be [s].
     """
 
     program_silence: float = MonitoringLimits().program_silence
@@ -52,8 +52,13 @@ class Parts:
     hold_up: float = HOLD_UP_LIMIT
     second_silence: float = UNGUARDED_TIME
     watchdog: float = 0.25
+    watchdog_period: float = 0.25
 
 
+#: what the parts are where the controller waits for as long as a scene may let it
+PATIENT_CONTROLLER = {"watchdog": 1.0, "watchdog_period": 1.0}
+#: what they are where no program on the controller heeds a heartbeat, as with external control none has to
+HEEDLESS_PROGRAM = {"watchdog": math.inf}
 #: name -> what has to hold
 PROCESS_INVARIANTS = {
     "touched": "A touch under a guard that lives stops the arm in the same tick.",
@@ -82,7 +87,7 @@ class _State:
     latched: bool = False
     touched: bool = False
     program_age: int = 0  # as the guard hears it
-    helper_age: int = 0
+    helper_age: int = 0  # of the helper, or of the second watchdog, whichever it has not heard for longest
     guard_age: int = 0  # as the helper hears it
     second_age: int = 0  # as the second watchdog hears the guard
     kick_age: int = 0  # as the controller hears the driver process, or the guard's count
@@ -96,13 +101,23 @@ class ProcessWorld:
     Args:
         control: "internal" or "external".
         parts: who listens to whom, and for how long.
+        most_wrong: processes or lines at once, beside lost beats.
+        without: first words of actions that do not happen.
     """
 
-    def __init__(self, control: str, parts: Parts = Parts(), state: _State = _State()) -> None:
+    def __init__(
+        self,
+        control: str,
+        parts: Parts = Parts(),
+        most_wrong: int = 2,
+        without: tuple[str, ...] = (),
+        state: _State = _State(),
+    ) -> None:
         self.control, self.parts, self.state = control, parts, state
+        self.most_wrong, self.without = most_wrong, without
 
     def copy(self) -> ProcessWorld:
-        return ProcessWorld(self.control, self.parts, self.state)
+        return ProcessWorld(self.control, self.parts, self.most_wrong, self.without, self.state)
 
     def key(self) -> Hashable:
         return self.state
@@ -127,7 +142,7 @@ class ProcessWorld:
 
     def actions(self) -> Sequence[str]:
         state, found = self.state, ["tick"]
-        more = self._wrong() < _MOST_WRONG
+        more = self._wrong() < self.most_wrong
         for name in self._names:
             how = getattr(state, name)
             found += [f"thaw {name}"] if how in (_FROZEN, _HELD_UP) else []
@@ -138,7 +153,7 @@ class ProcessWorld:
         found += ["free"] if state.touched else ["touch"]
         found += ["reset"] if state.latched else []
         found += ["lose a beat"] if state.lost < _MOST_LOST and state.moves and not self._wrong() else []
-        return found
+        return [action for action in found if not action.startswith(self.without)]
 
     def act(self, action: str) -> list[str]:
         before, broken = self.state, list[str]()
@@ -177,12 +192,14 @@ class ProcessWorld:
         state, parts, internal = self.state, self.parts, self.control == "internal"
         guard, helper, second = state.guard == _ALIVE, state.helper == _ALIVE, state.second == _ALIVE
         # whoever waits for a processor is runnable, which the guard sees
-        process_silence = (
-            max(parts.process_silence, parts.hold_up) if state.helper == _HELD_UP else parts.process_silence
-        )
+        waits = state.helper == _HELD_UP and (internal or second)
+        process_silence = max(parts.process_silence, parts.hold_up) if waits else parts.process_silence
         hears = {
             "program_age": (state.program != _FROZEN and guard, parts.program_silence),  # looked at: no beat is lost
-            "helper_age": (helper and guard and not lost, max(parts.process_silence, parts.hold_up)),
+            "helper_age": (
+                helper and (internal or second) and guard and not lost,
+                max(parts.process_silence, parts.hold_up),
+            ),
             "guard_age": (guard and helper and not lost, parts.guard_silence),
             "second_age": ((guard and second and not lost) or internal, parts.second_silence),
             "kick_age": ((helper if internal else guard) and not state.cut, parts.watchdog),
@@ -239,7 +256,8 @@ class ProcessWorld:
         if state.moves and before.latched and not before.moves:
             broken.append("released: it moves without a reset")
         longest = state.wrong_for
-        if state.cut and self._heeds and longest > _ticks(0.25) + _STOP_TICKS:
+        period = self.parts.watchdog_period
+        if state.cut and self._heeds and longest > _ticks(period) + _STOP_TICKS:
             broken.append(f"cut: it moves for {longest * _TICK:.2f} s")
         elif state.cut:
             pass  # nothing reaches the controller, and its program does not heed that: said in docs/safety.md
@@ -247,17 +265,18 @@ class ProcessWorld:
             limits = [0.5] if "helper" in alive else []
             limits += [1.0] if "second" in alive and not internal else []
             if self.parts.watchdog < math.inf and (not internal or "helper" not in alive):
-                limits.append(0.25)  # the controller's own
+                limits.append(period)  # the controller's own
             if limits and longest > _ticks(min(limits)) + _STOP_TICKS:
                 broken.append(f"unguarded: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
         elif state.helper == _HELD_UP and alive == {*self._names} - {"helper"}:
             if longest > _ticks(0.5) + _STOP_TICKS:
                 broken.append(f"frozen: it moves for {longest * _TICK:.2f} s beside a helper that is held up")
-        elif alive | {"second"} != {*self._names, "second"} and longest > _ticks(0.2) + _STOP_TICKS:
+        elif alive != {*self._names} and longest > _ticks(0.2) + _STOP_TICKS:
             broken.append(f"frozen: it moves for {longest * _TICK:.2f} s with {sorted(alive)} alive")
-        early = state.helper == _HELD_UP and self._wrong() == 1 and before.wrong_for <= _ticks(0.2)
-        early &= state.helper_age <= _ticks(0.2) + 1 and (not internal or self.parts.watchdog > 0.25)
-        if before.moves and not state.moves and early and not (state.touched or _were_wrong(before)):
+        early = state.helper == _HELD_UP and self._wrong() == 1 and state.helper_age <= _ticks(0.5)
+        early &= not (before.latched or state.touched) and state.program_age == state.second_age == 0
+        early &= not internal or self.parts.watchdog > 0.5  # else the controller ends the program first
+        if before.moves and not state.moves and early:
             broken.append("held up: it is stopped although its helper only waits for a processor")
         if before.moves and not state.moves and not (self._wrong() or state.touched or _were_wrong(before)):
             broken.append("patient: it is stopped although nothing is wrong")
