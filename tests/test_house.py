@@ -68,7 +68,7 @@ HOMES = {
     "scipy": (
         "geometry/fit/*.py",
         "geometry/fit/developable/*.py",
-        "geometry/hole_bridging.py",
+        "geometry/displacement_map.py",
         "geometry/mesh.py",
         "geometry/solid.py",
         "skin/field/*.py",
@@ -77,6 +77,7 @@ HOMES = {
         "tests/support/field/*.py",
         "src/coneskin/design/link_picture.py",
         "src/coneskin/design/workshop/placement.py",
+        "src/coneskin/design/sheets/cable_way.py",
     ),
 }
 #: the live path: no numpy in any of it

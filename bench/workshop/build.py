@@ -26,7 +26,7 @@ from scipy.spatial import KDTree
 import coneskin as cs
 from bench.report import head
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, _blind_angle, cover_seams, design_sheets
-from coneskin.design.workshop.jig import Collar, _with_sheets, jig_collars
+from coneskin.design.workshop.jig import Collar, jig_collars, with_sheets
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
@@ -82,8 +82,8 @@ def _finished(text: str) -> dict[str, list[str]]:
 
 def seams() -> None:
     narrow = ElectrodePlan(margin=4e-3, electrode=3e-3, lead=3e-3, clearance=1e-3, hole=0.0)
-    rows = {"default": DesignOptions(), "narrow electrodes": DesignOptions(plan=narrow)}
-    rows |= {"flap of 10 mm": DesignOptions(overlap=10e-3), "strip": DesignOptions(cover_seam=True)}
+    rows = {"default": DesignOptions(plan=ElectrodePlan()), "narrow electrodes": DesignOptions(plan=narrow)}
+    rows["strip"] = DesignOptions(plan=ElectrodePlan(), cover_seam=True)
     rows["strip, narrow"] = DesignOptions(plan=narrow, cover_seam=True)
     for radius in (0.0375, 0.054, 0.075):
         for name, options in rows.items():
@@ -163,7 +163,7 @@ def jig(path: Path) -> Iterator[str]:
     assert design.mesh is not None
     for index, sheet in enumerate(design.sheets):
         collars, without = jig_collars(sheet, design.mesh, design.sheets[:index])
-        body = _with_sheets(design.mesh, design.sheets[:index])
+        body = with_sheets(design.mesh, design.sheets[:index])
         for collar in collars:
             gaps = [_gap(sheet, collar, part.surface, body) for part in collar.parts]
             turns = "" if collar.play is None else f", turns {math.degrees(collar.play):.0f} deg"

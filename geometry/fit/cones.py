@@ -15,11 +15,10 @@ from .axis_plan import AxisPlan, SheetRequirements
 from .bare_areas import BareArea, bare_areas, hull_note
 from .candidates import SampledLink, sample_link
 from .coarse_packing import AxisSurvey, better_surveys, survey_axes
-from .fit_options import MOST_TOLERANCE, FitOptions, with_named
+from .fit_options import MOST_TOLERANCE, FitOptions, check_names
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import FineStage, SheetPlan, best_plan
 from .surface_samples import SurfaceSamples
-from .touch_weights import TouchWeights
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
@@ -42,7 +41,7 @@ class LinkFit:
         candidates: number of axes tried.
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
-        touch_weights: map by which areas were weighed; None where all count the same.
+        weights: name of the map by which areas were weighed; empty where all count the same.
     """
 
     sheets: tuple[FittedSheet, ...]
@@ -55,12 +54,7 @@ class LinkFit:
     candidates: int
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
-    touch_weights: TouchWeights | None = None
-
-    @property
-    def weights(self) -> str:
-        """Name of the map by which areas were weighed; empty where all count the same."""
-        return "" if self.touch_weights is None else self.touch_weights.name
+    weights: str = ""
 
 
 def find_cones(
@@ -87,7 +81,8 @@ def find_cones(
         GeometryError: an option is out of range.
         MeshError: no face of the mesh is visible from outside.
     """
-    options = with_named(options, named)
+    check_names(named)
+    options = replace(options or FitOptions(), **named)
     say = progress or (lambda _: None)
     return fit_cones(sample_link(mesh, options, say), options, say)
 
@@ -125,7 +120,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         reason="",
         candidates=len(link.axes),
         needed_tolerance=tolerance,
-        touch_weights=link.weights,
+        weights=link.weights.name if link.weights else "",
     )
     if plan is None:
         length, least = fit.link_length, options.min_length

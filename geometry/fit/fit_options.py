@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,16 +113,6 @@ def check_names(names: Iterable[str], more: tuple[str, ...] = ()) -> None:
             near = difflib.get_close_matches(name, known, 1, 0.5)
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(known))}"
             raise GeometryError(f"{name} is no option of the search for sheets; {hint}")
-
-
-def with_named(options: FitOptions | None, named: Mapping[str, Any]) -> FitOptions:
-    """Return options with those that are given by name.
-
-    Raises:
-        GeometryError: a name is unknown, or a value is out of range.
-    """
-    check_names(named)
-    return replace(options or FitOptions(), **named)
 
 
 def _check_count(name: str, value: int, least: int, most: int) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coneskin.geometry.hole_bridging import bridge_holes
+from coneskin.geometry.displacement_map import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 

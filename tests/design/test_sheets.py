@@ -1,20 +1,18 @@
 """Sheets for the places on a link: a link on which nothing fits is refused with its reason."""
 
-import math
 import re
 
 import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.sheet_design import _adjoin, design_sheets
+from coneskin.design.sheets.sheet_design import design_sheets
 from coneskin.design.sheets.summary import design_summary
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.pose import Pose
 
 
 @pytest.mark.long
@@ -42,20 +40,3 @@ def test_a_taper_below_the_noise_of_a_mesh_is_a_cylinder(taper: float, straight:
     assert (design_summary(design)["link_cone"]["r1_mm"] is None) == straight
     (exact,) = design_sheets([found])  # dimensions that were given are kept
     assert exact.place.frustum == found.frustum
-
-
-@pytest.mark.parametrize(
-    ("wrap", "turn", "height", "joined"),
-    [
-        (math.tau, 0.0, 0.1, True),
-        (math.tau, 1.0, 0.1, True),  # a full wrap may turn its seam
-        (5.0, 0.0, 0.1, True),
-        (5.0, 1.0, 0.1, False),
-        (5.0, 0.0, 0.0, False),  # on the same length
-    ],
-)
-def test_sheets_that_follow_each_other_are_joined(wrap: float, turn: float, height: float, joined: bool) -> None:
-    c, s = math.cos(turn), math.sin(turn)
-    one = PlacedFrustum(Frustum(0.05, 0.05, 0.1, wrap))
-    two = PlacedFrustum(one.frustum, Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, height)))
-    assert _adjoin(one, two) is joined

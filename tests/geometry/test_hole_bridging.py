@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from coneskin.geometry.hole_bridging import bridge_holes
+from coneskin.geometry.displacement_map import bridge_holes
 
 Floats = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.developable import Developable
+from coneskin.geometry.displacement_map import bridge_holes
 from coneskin.geometry.fit.candidates import SampledLink
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, measure_profile
 from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
-from coneskin.geometry.hole_bridging import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 

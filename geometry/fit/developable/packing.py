@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
-from coneskin.geometry.fit.fit_options import FitOptions, with_named
+from coneskin.geometry.fit.fit_options import FitOptions, check_names
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.profile import RadialProfile
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
@@ -236,7 +236,8 @@ def find_sheets(
         GeometryError: an option is out of range.
         MeshError: no face of the mesh is visible from outside.
     """
-    options = with_named(options, named)
+    check_names(named)
+    options = replace(options or FitOptions(), **named)
     say = progress or (lambda _: None)
     link = sample_link(mesh, options, say)
     cones = fit_cones(link, options, say)

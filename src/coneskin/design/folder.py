@@ -252,7 +252,9 @@ def write_design(
         _require_step(sheets)
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
     faces = () if mesh is None else find_datum_faces(mesh)
-    figures = [measure_build(design, index, frame, mesh, sheets[:index], faces) for index, design in enumerate(sheets)]
+    figures = [
+        measure_build(design, index, frame, mesh, sheets[:index], faces, sheets) for index, design in enumerate(sheets)
+    ]
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
     data["sheets"] = [
         design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)
@@ -274,8 +276,7 @@ def write_design(
             from .pictures import draw_pictures
 
             tolerance, areas = (0.0, ()) if fit is None else (fit.tolerance, fit.bare_areas)
-            weights = None if fit is None else fit.touch_weights
-            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas, weights)
+            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas)
         text = report_text(sheets, figures, title, (*notes, *larger, f"Frame of all poses: {frame}"), fit, drawn, beds)
         (draft / "report.md").write_text(text, encoding="utf-8")
         written = ["report.md", *(file for _, file in drawn)]

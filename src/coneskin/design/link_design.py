@@ -6,7 +6,6 @@ A link is a mesh file, or a link of a URDF.
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError, MeshError
-from coneskin.geometry.drawing.electrode_layout import LEAST_ACTIVE_SHARE, NARROWEST_PLAN, best_layout
+from coneskin.geometry.drawing.electrode_layout import NARROWEST_PLAN
 from coneskin.geometry.fit.fit_options import check_names
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import MAX_LENGTH, Mesh, load_mesh
@@ -22,7 +21,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
 from .folder import FileOptions, check_target, write_design
-from .sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_sheets
+from .sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_assembly, design_sheets
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
@@ -247,28 +246,6 @@ class LinkDesign:
         return html_card(f"design of {self.name}", rows, step, f"{style}<div class='coneskin-flat'>{drawn}</div>")
 
 
-def _worth_their_wires(fit: LinkFit) -> tuple[LinkFit, tuple[str, ...]]:
-    """Return a fit without the sheets of which too little would be active, and a note of each of those."""
-    kept, poor = [], []
-    for sheet in fit.sheets:
-        side = sheet.frustum
-        try:
-            share = best_layout(side).active_share
-        except GeometryError:
-            share = 0.0
-        if share >= LEAST_ACTIVE_SHARE:
-            kept.append(sheet)
-            continue
-        poor.append(
-            f"no sheet of {1e3 * side.slant:.1f} mm and {math.degrees(side.wrap):.0f} deg: rims and electrodes would "
-            f"leave {share:.0%} of it active, less than {LEAST_ACTIVE_SHARE:.0%}; give the widths (electrodes) to "
-            "design it all the same"
-        )
-    if not kept:
-        raise GeometryError("there is no sheet to design: " + "; ".join(poor))
-    return dataclasses.replace(fit, sheets=tuple(kept)), tuple(poor)
-
-
 def _check_size(place: PlacedFrustum) -> None:
     """Refuse a side that is larger than any link, as where millimeters were meant.
 
@@ -337,7 +314,7 @@ def design_link(
     options = options or DesignOptions()
     check_names(search, ("round_only",))
     plan = options.plan or NARROWEST_PLAN
-    # neighbours about other axes need room for the sheets of these options
+    # neighbors about other axes need room for the sheets of these options
     search = {
         "thickness": options.stack.thickness,
         "gap": options.sheet_gap,
@@ -349,18 +326,16 @@ def design_link(
     fit: LinkFit | None = None
     name, frame, origin = "a link by its dimensions", "the axis of the link (z from end 1, x at phi = 0)", ""
     notes: tuple[str, ...] = ()
-    places: LinkFit | Sequence[PlacedFrustum]
+    places: Sequence[PlacedFrustum] = ()
     if isinstance(link, Frustum):
         places = (PlacedFrustum(link),)
     elif isinstance(link, str | Path | Mesh):
         origin = "" if isinstance(link, Mesh) else str(link)
         source, fit = _fit_link(link if isinstance(link, Mesh) else origin, unit, packages, say, arguments, **search)
-        places = fit
     else:
         places = link
-    if isinstance(places, Sequence):
-        for place in places:
-            _check_size(place)
+    for place in places:
+        _check_size(place)
     if source is not None:
         if fit is not None and not fit.sheets:
             raise NothingFits(source.mesh.source, fit)
@@ -370,14 +345,19 @@ def design_link(
             progress(f"note: {note}")
     if source is not None and not options.link:
         options = dataclasses.replace(options, link=source.name)
-    if fit is not None and options.plan is None:
-        places, poor = _worth_their_wires(fit)
-        notes = (*notes, *poor)
-        for note in poor:
-            progress(f"note: {note}")
-        fit = places
-    sheets = cover_seams(design_sheets(places, options))
     mesh = None if source is None else source.mesh
+    if fit is None:
+        sheets = design_sheets(places, options)
+    else:
+        progress("placing sheets, tabs and cables")
+        sheets, left_out = design_assembly(fit, options, mesh)
+        if not sheets:
+            raise GeometryError("there is no sheet to design: " + "; ".join(left_out))
+        fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
+        notes = (*notes, *left_out)
+        for note in left_out:
+            progress(f"note: {note}")
+    sheets = cover_seams(sheets, mesh)
     data: dict[str, Any] = {}
     if folder is not None:
         data = write_design(

@@ -129,9 +129,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         if fit["bridged_share"] > 0.0:
             bridged = f"{fit['bridged_share']:.1%} of the sheet, {fit['bridged_depth_mm']:.1f} mm deep"
             rows.append(["bridged holes and grooves", bridged])
-    if "gap_to_next_mm" in data:
-        gap = data["gap_to_next_mm"]
-        rows.append(["gap to the next sheet", f"{gap['inner']:.2f} mm on the link, {gap['outer']:.2f} mm outside"])
+    rows += [[f"least gap to {other}", f"{gap:.2f} mm"] for other, gap in data["gaps_mm"].items()]
     yield from _table(("quantity", "value"), rows)
     yield from section_head("Layers")
     assembly = f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]}"
@@ -173,8 +171,6 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         f"{width} at the narrow end."
     )
     yield f"* All four wires leave at {side_name(plan.wires)}."
-    if plan.wires == "end2" and design.next_joint is not None:
-        yield "* The tabs run into the next sheet there: bend them up, or choose another side for the wires."
     yield (
         f"* Active area: u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to "
         f"{patch['phi2_deg']:.2f} deg of the sheet: {share}. Around the link no touch is located over "
@@ -209,16 +205,12 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         ],
     )
     yield from section_head("Accuracy forecast")
+    along, around = (1e3 * max(sizes) for sizes in zip(*((s.along, s.around) for s in design.forecasts()), strict=True))
     yield (
-        f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of "
-        f"{parts.supply_volts:g} V (eq. 25, 26). This is the limit of the A/D converter; noise, the area of the "
-        "contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
+        f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of {parts.supply_volts:g} V is at "
+        f"most {along:.4f} mm along and {around:.4f} mm around (eq. 25, 26). This is the limit of the A/D converter; "
+        "noise, the area of the contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
     )
-    yield ""
-    keys = {"u_mm": 1, "along_mm": 4, "around_mm": 4, "azimuth_deg": 4, "theta_deg": 5}
-    steps = [[f"{step[key]:.{digits}f}" for key, digits in keys.items()] for step in data["forecast"]]
-    columns = ("u of the active area [mm]", "along [mm]", "around [mm]", "azimuth [deg]", "theta [deg]")
-    yield from _table(columns, steps)
 
 
 def _sharpest(place: PlacedFrustum) -> float:

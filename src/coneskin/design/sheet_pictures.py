@@ -6,6 +6,7 @@ They show its flat layout, and its parts pulled apart in their order.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from coneskin.geometry.drawing.cut_sheet import CutSheet
@@ -15,7 +16,7 @@ from coneskin.geometry.sector import unroll
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text
-from .workshop.build_figures import WIRE_COLOURS, CableExit
+from .workshop.build_figures import WIRE_COLOURS, SheetWire
 
 INK_COLOUR = "#222222"
 FOIL_COLOUR = "#c27c0e"
@@ -32,13 +33,13 @@ def _xy(outline: Outline, tolerance: float = 5e-5) -> tuple[list[float], list[fl
     return [x for x, _ in points], [y for _, y in points]
 
 
-def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
+def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) -> None:
     """Draw the layout of a sheet on the cone of its upper conductive layer, with dimensions in mm, and its wires.
 
     Args:
         figure: an empty figure of matplotlib.
         design: the sheet.
-        cable: its wires, from the tabs past the strain relief to the connector.
+        wires: from the tabs to the way of the cable.
     """
     axes = figure.add_subplot()
     layout = design.layout
@@ -62,8 +63,7 @@ def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
     if layout.holes:  # the legend would show an area as a rectangle
         label = f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
         axes.plot([], [], "o", mfc="white", mec=INK_COLOUR, mew=0.8, label=label)
-    if cable.side.startswith("end"):
-        _draw_cable(axes, design, cone, cable)
+    _draw_cable(axes, design, cone, wires)
     _dimensions(axes, design, cone)
     axes.margins(0.08)
     axes.set_aspect("equal")
@@ -71,37 +71,44 @@ def draw_layout(figure: Any, design: SheetDesign, cable: CableExit) -> None:
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
 
 
-def _draw_cable(axes: Any, design: SheetDesign, cone: Any, cable: CableExit) -> None:
-    """Draw the wires as they would lie if the link were flat too; one that crosses the seam ends at the edge."""
-    out = -1.0 if cable.side == "end1" else 1.0
+def _draw_cable(axes: Any, design: SheetDesign, cone: Any, wires: Sequence[SheetWire]) -> None:
+    """Draw the wires as they would lie if the link were flat too, on the side of the seam where the cable is."""
+    way = design.way
+    ends = way.side.startswith("end")
+    off = {"end1": (-1.0, 0.0), "end2": (1.0, 0.0), "edge0": (0.0, -1.0), "edge1": (0.0, 1.0)}[way.side]
+    tab = 0.5 * design.layout.plan.tab
+    turned = math.tau * round((float(way.surface[0, 1]) - 0.5 * cone.wrap) / math.tau)
 
-    def at(away: float, phi: float) -> tuple[float, float]:
-        """Return a place beyond the end [mm], away from it [m] along the ruling through phi."""
-        x, y = drawing_point(cone, cable.u, phi)
-        turn = (phi - 0.5 * cone.wrap) * cone.sin_half_angle
-        return 1e3 * (x + out * away * math.sin(turn)), 1e3 * (y + out * away * math.cos(turn))
+    def at(u: float, phi: float) -> tuple[float, float]:
+        x, y = drawing_point(cone, u, phi)
+        return 1e3 * x, 1e3 * y
 
-    middle = math.remainder(cable.phi, 2.0 * math.pi) if cable.phi > cone.wrap else cable.phi
-    middle = middle - 2.0 * math.pi if middle > math.pi and design.has_seam else middle
-    tab = design.layout.plan.tab
-    for wire in cable.wires:
+    exit_phi = float(way.surface[0, 1]) - turned
+    for wire in wires:
         name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
         style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
-        if abs(wire.phi - middle) > math.pi:
-            axes.plot(*zip(at(tab, wire.phi), at(0.5 * cable.tie + 0.5 * tab, cone.wrap), strict=True), **style)
-            way = "across\nthe seam" if design.has_seam else "around\nthe link"
-            axes.text(*at(cable.tie, wire.phi), f"{name}, {way}", fontsize=7, ha="center", va="center")
+        beyond = wire.u + off[0] * tab, wire.phi + off[1] * tab / max(cone.radius_at(wire.u), 1e-3)
+        target = (beyond[0], exit_phi) if ends else (float(way.surface[0, 0]), beyond[1])
+        if ends and abs(target[1] - wire.phi) > math.pi:  # the shorter way goes across the seam, or around the link
+            edge = cone.wrap if wire.phi > target[1] else 0.0
+            axes.plot(*zip(at(wire.u, wire.phi), at(*beyond), at(beyond[0], edge), strict=True), **style)
+            word = "across\nthe seam" if design.has_seam else "around\nthe link"
+            x, y = at(wire.u + 2.5 * off[0] * tab, wire.phi)
+            axes.text(x, y, f"{name}, {word}", fontsize=7, ha="center", va="center")
             continue
-        steps = [at(tab, wire.phi), at(cable.tie, middle), at(cable.connector, middle)]
-        if abs(wire.phi - middle) > 0.6:  # around the end, not across it
-            around = [wire.phi + (middle - wire.phi) * k / 24.0 for k in range(25)]
-            steps[1:2] = [at(tab + (cable.tie - tab) * k / 24.0, phi) for k, phi in enumerate(around)]
-        axes.plot(*zip(*steps, strict=True), **style)
-    axes.plot(*zip(at(cable.tie, middle), at(cable.connector, middle), strict=True), color=INK_COLOUR, lw=2.5)  # as one
-    for away, marker, word in ((cable.tie, "s", "cable tie"), (cable.connector, "D", "connector")):
-        x, y = at(away, middle)
+        run = [at(*(beyond[i] + (target[i] - beyond[i]) * k / 24.0 for i in range(2))) for k in range(25)]
+        axes.plot(*zip(at(wire.u, wire.phi), *run, strict=True), **style)
+    if design.has_seam and not ends:
+        return  # the cable stands up from the seam
+    led = [at(float(u), float(phi) - turned) for u, phi in way.surface]
+    axes.plot(*zip(*led, strict=True), color=INK_COLOUR, lw=2.5)
+    for index, marker, word, length in (
+        (way.tie, "s", "cable tie", way.tie_length),
+        (-1, "D", "connector", way.connector_length),
+    ):
+        x, y = led[index]
         axes.plot([x], [y], marker, color=INK_COLOUR, ms=6)
-        label = f"{word}, {1e3 * away:g} mm from the rim"
+        label = f"{word}, {1e3 * length:.0f} mm from the rim"
         style = {"fontsize": 8, "ha": "right", "va": "center"}
         axes.annotate(label, (x, y), (-8.0, 0.0), textcoords="offset points", **style)  # beside the mark at any scale
 

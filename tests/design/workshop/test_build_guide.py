@@ -9,13 +9,13 @@ import pytest
 
 from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES
-from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
-from coneskin.design.workshop.build_figures import LOOP, BuildFigures, _cable_exit, measure_build
+from coneskin.design.workshop.build_figures import LOOP, BuildFigures, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable
-from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
+from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
 from coneskin.geometry.drawing.touch_marks import CoverMarks
 from coneskin.geometry.frustum import Frustum
@@ -56,13 +56,14 @@ def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) ->
     from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 
     stack = replace(PAPER_STACK, assembly=assembly)  # type: ignore[arg-type]
-    design, figures = built(Frustum(0.054, 0.054, 0.2), stack=stack, wires=side)
+    wrap = math.pi if side.startswith("edge") else math.tau  # no tab finds room between two edges that meet
+    design, figures = built(Frustum(0.054, 0.054, 0.2, wrap), stack=stack, wires=side)
     text = guide(design, figures)
     steps = text.split("### Place")[0]
     for part in (1, 3, 4, 5, 7):
         assert re.search(rf"\b[Pp]arts? {part}\b|\b1 and 3\b|\b5 and 7\b", steps)
     assert f"part 3 on the bench, {design.cuts[2].face} up" in steps
-    assert ("lead them out between the edges" in steps) == side.startswith("edge")
+    assert ("lead them out on the bare link beside that edge" in steps) == side.startswith("edge")
 
 
 @pytest.mark.parametrize("side", ["end1", "end2"])
@@ -86,27 +87,27 @@ def test_a_sheet_reads_what_its_conductive_layers_measure_between_their_electrod
     assert fitted == pytest.approx((radial.ohms, angular.ohms))
 
 
-@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("side", ["end1", "end2"])
 @pytest.mark.parametrize("tab", [0.0, 0.012])
 def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: float) -> None:
-    layout = lay_out_sheet(Frustum(0.054, 0.054, 0.2), ElectrodePlan(wires=side, tab=tab))
-    cable = _cable_exit(layout, 0.06)
-    assert [wire.electrode for wire in cable.wires] == ["A", "B", "C", "D"]
-    assert [wire.pin for wire in cable.wires] == [1, 2, 3, 4]
-    for wire in cable.wires:
-        if side.startswith("end"):
-            across = abs(math.remainder(wire.phi - cable.phi, 2 * math.pi)) * 0.054
-            assert across < 0.03, "the tabs are beside each other, some across the seam"
-        else:
-            across = abs(wire.u - cable.u)
-        assert 0.0 < wire.length - (across + 0.06 + LOOP) < 0.02
-    assert cable.tie == 0.03, "half way to the connector"
+    design, figures = built(Frustum(0.054, 0.054, 0.2), plan=ElectrodePlan(tab=tab), wires=side)
+    way = design.way
+    assert [wire.electrode for wire in figures.wires] == ["A", "B", "C", "D"]
+    assert [wire.pin for wire in figures.wires] == [1, 2, 3, 4]
+    for wire in figures.wires:
+        across = abs(math.remainder(wire.phi - way.phi, 2 * math.pi)) * 0.054
+        assert across < 0.03, "the tabs are beside each other, some across the seam"
+        assert 0.0 < wire.length - (across + way.connector_length + LOOP) < 0.02
+    assert way.connector_length == pytest.approx(0.06, abs=6e-3)
+    assert way.tie_length == pytest.approx(0.03, abs=4e-3), "half way to the connector"
+
+
+def test_a_connector_is_as_far_as_a_hand_reaches() -> None:
     (least,) = (1e-3 * key.low for key in DESIGN_TABLES["sheet"][1] if key.name == "connector_mm")
-    assert _cable_exit(layout, least).connector == least, "design.toml allows what the cable allows, and no more"
-    with pytest.raises(GeometryError, match="the connector must be 30 to 2000 mm from the rim, got 1 mm"):
-        _cable_exit(layout, 1e-3)
-    with pytest.raises(GeometryError):
-        _cable_exit(layout, least - 1e-6)
+    built(CONE, connector=least)
+    for wrong in (1e-3, least - 1e-6):
+        with pytest.raises(GeometryError, match="the connector must be 30 to 2000 mm from the rim"):
+            built(CONE, connector=wrong)
 
 
 def bumped(azimuth: float | None) -> Mesh:
@@ -130,37 +131,6 @@ def test_a_sheet_is_placed_from_what_the_link_shows(azimuth: float) -> None:
     assert place.beyond == pytest.approx(0.05)
     assert place.around1 == pytest.approx(2 * math.pi * 0.05)
     assert place.seam == pytest.approx(pose.rotate((1.0, 0.0, 0.0)))
-    assert place.feature is not None
-    assert place.feature.azimuth == pytest.approx(azimuth)
-    assert place.feature.arc == pytest.approx(azimuth * 0.05)
-    assert place.feature.end == 2
-
-
-def test_a_round_link_has_nothing_to_measure_the_seam_from() -> None:
-    place = find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), bumped(None))
-    assert place.feature is None
-    assert place.before == pytest.approx(0.03)
-    collar = bumped(None)
-    wide = collar.vertices * np.where(collar.vertices[:, 2:] > 0.2, (1.5, 1.5, 1.0), (1.0, 1.0, 1.0))
-    assert find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), Mesh(wide, collar.faces)).feature is None
-
-
-@pytest.mark.parametrize(("azimuth", "in_the_way"), [(0.0, True), (1.5, False)])
-def test_a_part_of_the_link_in_the_way_of_the_cable_is_told(azimuth: float, in_the_way: bool) -> None:
-    """A block of 45 degrees, from 12 mm beyond end 2 on, 20 mm high."""
-    tube = bumped(None)
-    phi = azimuth + np.array([-0.4, 0.4, 0.4, -0.4])
-    r = np.array([0.03, 0.03, 0.07, 0.07])
-    wall = np.column_stack([r * np.cos(phi), r * np.sin(phi), np.full(4, 0.212)])
-    faces = np.vstack([tube.faces, [[144, 145, 146], [144, 146, 147]]])
-    mesh = Mesh(np.vstack([tube.vertices, wall]), faces)
-    place = PlacedFrustum(Frustum(0.05, 0.05, 0.2))
-    free = find_placement(place, mesh).free
-    assert free == (math.inf, pytest.approx(0.012) if in_the_way else math.inf)
-    (design,) = design_sheets([place], DesignOptions(wires="end2"))
-    text = guide(design, measure_build(design, 0, mesh=mesh))
-    assert ("in the way of the cable at edge 0, 12.0 mm beyond end 2" in text) == in_the_way
-    assert ("mount there, 30.0 mm" in text) == in_the_way
 
 
 def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
@@ -207,17 +177,6 @@ def test_the_bends_of_an_oval_and_of_a_rounded_box_show_where_edge_0_is() -> Non
     assert sharpest_bends(PlacedFrustum(Frustum(radius, radius, 0.2))) == []
 
 
-def test_a_sheet_beyond_whose_edge_something_stands_out_is_placed_by_a_straight_line() -> None:
-    """A tape measure does not follow the link there: the distance of the two points, by their coordinates."""
-    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions())
-    text = guide(design, measure_build(design, 0, "mesh", bumped(4.5)))
-    exact = math.dist((0.05, 0.0, 0.2), (0.08 * math.cos(4.5), 0.08 * math.sin(4.5), 0.24))
-    assert f"{1e3 * exact:.1f} mm straight through the air, from edge 0 at end 2 (257.8 deg)" in text
-    assert "around end 2, in the direction of the wrap (257.8" not in text
-    assert "| +y | 78.5 mm (90.0 deg) |" in text
-    assert "| -y |" not in text, "no place of the sheet faces there"
-
-
 def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:
     """A short sheet: what lies beside its active area carries most of the current, and the guide says so."""
     design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)), plan=ElectrodePlan())
@@ -248,39 +207,32 @@ def ending_at(low: float, high: float) -> Mesh:
     return Mesh(np.concatenate([tube.vertices[:, :2], heights], axis=1), tube.faces)
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "said"),
-    [
-        (-0.1, 0.3, ""),
-        (-0.005, 0.3, "so the cable tie and the connector lie on what is bolted to the link"),
-        (-0.045, 0.3, "so the connector lies on what is bolted to the link"),
-    ],
-)
-def test_a_cable_beyond_the_end_of_the_link_is_led_to_what_is_there(low: float, high: float, said: str) -> None:
-    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
-    text = guide(design, measure_build(design, 0, "mesh", ending_at(low, high)))
-    assert ("bolted to the link" in text) == bool(said)
-    if said:
-        assert f"The link ends {-1e3 * low:.1f} mm beyond end 1, {said}" in text
-        assert "design again with `--set sheet.wires=end2`, where there are 100.0 mm of link" in text
+@pytest.mark.parametrize(("low", "high", "end"), [(-0.1, 0.202, "end 1"), (-0.005, 0.3, "end 2")])
+def test_a_cable_lies_where_the_link_goes_on(low: float, high: float, end: str) -> None:
+    mesh = ending_at(low, high)
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions(), mesh=mesh)
+    text = guide(design, measure_build(design, 0, "mesh", mesh))
+    assert f"Fold the tabs over {end}" in text
+    assert "bolted to the link" not in text
+    assert low < design.way.points[:, 2].min() < design.way.points[:, 2].max() < high
 
 
-def test_a_link_without_room_at_either_end_carries_its_cable_on_the_sheet() -> None:
-    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
-    text = guide(design, measure_build(design, 0, "mesh", ending_at(-0.001, 0.202)))
+def test_a_link_without_room_at_either_end_carries_its_cable_on_what_is_bolted_to_it() -> None:
+    mesh = ending_at(-0.001, 0.062)
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.06))], DesignOptions(), mesh=mesh)
+    text = guide(design, measure_build(design, 0, "mesh", mesh))
+    assert "bolted to the link there" in text
     assert "glue the mount on part 7" in text
-    assert "design again with `--set sheet.wires" not in text
 
 
 def test_only_a_sheet_whose_edges_meet_has_a_seam() -> None:
-    """Of a partial wrap the guide speaks of two edges."""
+    """Of a partial wrap the guide speaks of two edges; between edges that meet there is no room for tabs."""
     for wrap, seam in ((2 * math.pi, True), (math.pi, False)):
-        design, figures = built(Frustum(0.054, 0.054, 0.2, wrap), wires="edge0")
+        design, figures = built(Frustum(0.054, 0.054, 0.2, wrap))
         assert design.has_seam == seam
-        text = guide(design, figures)
-        assert ("The seam: the edges of every part meet" in text) == seam
-        assert ("lead them out between the edges" in text) == seam
-        assert ("lead them out on the bare link beside that edge" in text) != seam
+        assert ("The seam: the edges of every part meet" in guide(design, figures)) == seam
+    with pytest.raises(GeometryError, match="sheet 1: at edge 0 the tabs would lie on the sheet itself"):
+        built(Frustum(0.054, 0.054, 0.2), wires="edge0")
 
 
 def test_the_bill_has_what_the_steps_use_up() -> None:
@@ -302,19 +254,6 @@ def test_the_bill_has_what_the_steps_use_up() -> None:
     assert "hook-and-loop tape" in text
     assert "isopropanol" in text
     assert any("isopropanol" in name for name in items)
-
-
-def test_what_no_ruler_reaches_is_not_told() -> None:
-    """A part that stands out 0.5 m away is no place to measure from; at 0.13 m it is (above)."""
-    (design,) = design_sheets(
-        [PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions(jig=JigPlan("none"))
-    )
-    mesh = bumped(4.5)
-    for reach, told in ((0.1, True), (0.5, False)):
-        far = np.array(mesh.vertices)
-        far[-1] = reach * math.cos(4.5), reach * math.sin(4.5), 0.24
-        text = guide(design, measure_build(design, 0, "mesh", Mesh(far, mesh.faces)))
-        assert ("through the air" in text) == told
 
 
 def test_an_end_at_the_links_own_end_is_told_for_a_tilted_sheet_too() -> None:

@@ -228,10 +228,10 @@ def test_no_part_has_an_undercut() -> None:
 
 def test_sheets_that_meet_have_collars_at_their_free_ends_only() -> None:
     one, two = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
-    first, said = jig_collars(one, None, ())
+    first, said = jig_collars(one, None, (), (one, two))
     assert [collar.end for collar in first] == [1]
     assert "at end 2 it meets the sheet beside it" in said[0]
-    second, said = jig_collars(two, None, (one,))
+    second, said = jig_collars(two, None, (one,), (one, two))
     assert [collar.end for collar in second] == [2]
     assert "at end 1 it meets the sheet beside it" in said[0]
 

@@ -5,11 +5,13 @@ A strip over the blind seam of a full wrap is a sheet of its own, on top of the 
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from coneskin.core.errors import GeometryError, SensorError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
@@ -17,7 +19,6 @@ from coneskin.geometry.drawing.electrode_layout import (
     ElectrodePlan,
     ResolutionForecast,
     SheetLayout,
-    best_layout,
     forecast_resolution,
     lay_out_sheet,
 )
@@ -25,17 +26,26 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.ray_casting import RayCaster
 from coneskin.scene.tables.sensor_tables import with_key_names
 from coneskin.skin.electronics import Electronics, GivenElectronics, match_electronics
 from coneskin.skin.materials import SheetMaterial, match_sheet_materials
 from coneskin.skin.sensor import sheet_resistances
 
+from .assembly import PlacedSheet, assemble, sheet_gap
+from .cable_way import SheetBody
+
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
+    from coneskin.geometry.mesh import Mesh
+
+    from .cable_way import Body, CableWay, TabApron
 
 JigSurface = Literal["link", "cone", "none"]
 _MIN_GRIP = 4e-3  # m
+_CONNECTOR_LIMITS = (0.03, 2.0)  # m; from the rim to the connector
+_NEAR_SHEET = 0.02  # m; a sheet so near is a neighbor
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,44 +85,6 @@ class JigPlan:
             raise GeometryError(f"a jig is split into 2 to 8 parts, got {self.parts}")
 
 
-@dataclass(frozen=True, slots=True)
-class _SheetJoint:
-    """The joint between a sheet and the next one on the axis.
-
-    Attributes:
-        inner: distance along the axis at the faces on the link [m].
-        outer: the same at the outer faces [m].
-        trimmed: length by which both sheets together were shortened along the axis [m].
-    """
-
-    inner: float
-    outer: float
-    trimmed: float
-
-
-def _adjoin(one: PlacedFrustum, two: PlacedFrustum) -> bool:
-    """Tell whether two sheets follow each other along one axis, with the same wrap."""
-    turn = one.link_frustum.inverse() @ two.link_frustum
-    x, y, z = turn.translation
-    tilt = math.hypot(turn.rotation[0][2], turn.rotation[1][2])
-    same = abs(one.frustum.wrap - two.frustum.wrap) < 1e-6
-    same &= one.frustum.wrap > math.tau - 1e-6 or turn.rotation[0][0] > 1.0 - 1e-9
-    return same and tilt < 1e-6 and math.hypot(x, y) < 1e-6 and z > 0.5 * one.frustum.height
-
-
-def _find_joint(one: PlacedFrustum, two: PlacedFrustum, stack: LayerStack, gap: float) -> _SheetJoint:
-    """Return the joint of two neighbours, trimmed so that no layer of one runs into the other.
-
-    A face at the height t above the link is shifted along the axis by -t sin(half angle): at a belt the outer faces
-    separate, at a waist they approach.
-    """
-    start = two.link_frustum.translation
-    apart = one.link_frustum.inverse().apply(start)[2] - one.frustum.height
-    opening = stack.thickness * (one.frustum.sin_half_angle - two.frustum.sin_half_angle)
-    trimmed = max(0.0, gap - apart - min(0.0, opening))
-    return _SheetJoint(apart + trimmed, apart + trimmed + opening, trimmed)
-
-
 _LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
 _MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
 _STRAIGHT_SHARE = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
@@ -125,21 +97,20 @@ class DesignOptions:
     Attributes:
         stack: the five layers.
         plan: electrodes, tabs, holes, for all sheets; None to choose those that leave most of each sheet active.
-        wires: side where the wires leave, for all sheets; None for end 1, but end 2 of the last of several on one axis:
-            tabs do not run into the neighbour.
+        wires: side where the wires leave, for all sheets; None for the side of each sheet where they find room.
         electronics: as far as they are fixed; the rest is chosen to match each sheet (``match_electronics``).
         upper_sheet_ohms: sheet resistance of the upper conductive layer [ohm per square]; None to choose a material
             for the shape of each sheet (``match_sheet_materials``).
         lower_sheet_ohms: the same of the lower conductive layer.
         seam_gap: gap of the seam of a full wrap, at the narrow end of the innermost face.
-        overlap: width of a flap on the upper substrate that closes the seam.
         cover_seam: True for a strip over the seam of each full wrap, a sensor of its own that closes it.
-        sheet_gap: smallest distance between neighbouring sheets along the axis.
+        sheet_gap: smallest distance between neighboring sheets.
         kerf: width of the cut.
         snap: a pattern is cut as a rectangle if that moves no cut by more.
         face_up: face that is up in the drawings.
         link: name of the link, on every part.
-        connector: distance from the rim of the sheet to the connector in which its wires end.
+        connector: wished way from the rim of the sheet to the connector in which its wires end; where there is no room
+            it is shorter.
         jig: printed collars that hold the sheet at its place on the link.
     """
 
@@ -150,7 +121,6 @@ class DesignOptions:
     upper_sheet_ohms: float | None = None
     lower_sheet_ohms: float | None = None
     seam_gap: float = 0.0
-    overlap: float = 0.0
     cover_seam: bool = False
     sheet_gap: float = 1e-3
     kerf: float = 0.0
@@ -175,7 +145,9 @@ class SheetDesign:
         options: of the design.
         conductive: the upper and the lower conductive sheet, given or chosen.
         electronics: those given, and those that match.
-        next_joint: joint with the next sheet; None for the last one.
+        apron: strip of its tabs beyond the rim.
+        way: of its cable on the link.
+        gaps: least distance to each other sheet nearer than 20 mm, by its name [m].
         fit: fit of the place to the mesh; None for a link given by its dimensions.
         above: name of the sheet on which it lies, where it is a strip over the seam of that.
         seam_offset: angle from edge 0 of such a strip to the middle of the seam below it [rad].
@@ -189,7 +161,9 @@ class SheetDesign:
     options: DesignOptions
     conductive: tuple[SheetMaterial, SheetMaterial]
     electronics: Electronics
-    next_joint: _SheetJoint | None = None
+    apron: TabApron
+    way: CableWay
+    gaps: Mapping[str, float] = field(default_factory=dict)
     fit: FittedSheet | None = None
     above: str = ""
     seam_offset: float = 0.0
@@ -200,14 +174,25 @@ class SheetDesign:
     @property
     def dimensions(self) -> str:
         """Radii and wrap of the side of the link that it covers, in words."""
-        side = self.place.frustum
-        wrap = f"height {1e3 * side.height:.1f} mm, wrap {math.degrees(side.wrap):.0f} deg"
-        return f"radii {1e3 * side.radius1:.1f} and {1e3 * side.radius2:.1f} mm, {wrap}"
+        return _dimensions(self.place.frustum)
 
     @property
     def has_seam(self) -> bool:
         """Whether its two edges meet, or nearly; otherwise the link is bare between them."""
         return self.place.frustum.wrap > 2.0 * math.pi - 0.5
+
+    def outer_face(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return points of the outer face [m], shape (..., 3), and their normals, at u [m] and phi [rad]."""
+        points, normals = self.place.place(u, phi)
+        return points + self.options.stack.thickness * normals, normals
+
+    def outer_triangles(self) -> NDArray[np.float64]:
+        """Return the triangles of the outer face [m], shape (n, 3, 3)."""
+        side = self.place.frustum
+        u, phi = np.meshgrid(np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181), indexing="ij")
+        grid = self.outer_face(u, phi)[0]
+        p, q, r, s = (part.reshape(-1, 3) for part in (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]))
+        return np.concatenate([np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)])
 
     def forecasts(self) -> list[ResolutionForecast]:
         """Return the resolution at five evenly spaced places from end 1 to end 2 of the active area."""
@@ -224,18 +209,46 @@ class SheetDesign:
         return parts.supply_volts / (radial + leads.a + leads.b), parts.supply_volts / (angular + leads.c + leads.d)
 
 
-def design_sheets(
-    places: LinkFit | Sequence[PlacedFrustum], options: DesignOptions | None = None, first: int = 1
-) -> tuple[SheetDesign, ...]:
-    """Design a sheet for each place on a link.
+def _dimensions(side: Frustum) -> str:
+    wrap = f"height {1e3 * side.height:.1f} mm, wrap {math.degrees(side.wrap):.0f} deg"
+    return f"radii {1e3 * side.radius1:.1f} and {1e3 * side.radius2:.1f} mm, {wrap}"
 
-    Args:
-        places: the sheets found on a link; or places in order along one axis, in the frame of the link.
-        options: of the design.
-        first: number of the first sheet.
+
+def design_sheets(
+    places: LinkFit | Sequence[PlacedFrustum], options: DesignOptions | None = None, mesh: Mesh | None = None
+) -> tuple[SheetDesign, ...]:
+    """Design a sheet for each place on a link, as ``design_assembly`` does.
 
     Raises:
-        GeometryError: there is no place, or a sheet cannot be made for one; the message says why, or names the sheet.
+        GeometryError: there is no place, or a sheet cannot be built; the message says why.
+    """
+    designs, left_out = design_assembly(places, options, mesh)
+    if left_out:
+        raise GeometryError(left_out[0])
+    return designs
+
+
+def design_assembly(
+    places: LinkFit | Sequence[PlacedFrustum],
+    options: DesignOptions | None = None,
+    mesh: Mesh | None = None,
+    first: int = 1,
+    beside: Sequence[Body] = (),
+) -> tuple[tuple[SheetDesign, ...], tuple[str, ...]]:
+    """Design the sheets for places on a link, all at once: none of them, or of their wires, meets another.
+
+    Args:
+        places: the sheets found on a link; or places in its frame.
+        options: of the design.
+        mesh: of the link, on which the cables lie; None where it goes on beyond its sheets as they do.
+        first: number of the first sheet.
+        beside: further bodies that none may meet.
+
+    Returns:
+        the sheets that can be built, and a sentence for each other one.
+
+    Raises:
+        GeometryError: there is no place, or a value is out of range; the message names the sheet.
     """
     options = options or DesignOptions()
     fits: Sequence[FittedSheet] = () if isinstance(places, Sequence) else places.sheets
@@ -247,53 +260,75 @@ def design_sheets(
         links = [_straightened(link, _STRAIGHT_SHARE * places.tolerance) for link in links]
     if not (math.isfinite(options.sheet_gap) and options.sheet_gap >= 0.0):
         raise GeometryError(f"sheet gap must be finite and not negative, got {options.sheet_gap * 1e3:.4g} mm")
-    joints = [
-        _find_joint(a, b, options.stack, options.sheet_gap) if _adjoin(a, b) else None
-        for a, b in itertools.pairwise(links)
-    ]
-    cuts = [0.0, *(0.5 * joint.trimmed if joint else 0.0 for joint in joints), 0.0]
-    designs = []
-    for i, link in enumerate(links):
-        name = f"sheet {i + first}"
+    low, high = _CONNECTOR_LIMITS
+    if not low <= options.connector <= high:
+        got = f"got {options.connector * 1e3:.4g} mm"
+        raise GeometryError(f"the connector must be {low * 1e3:g} to {high * 1e3:g} mm from the rim, {got}")
+    opened = []
+    for number, link in enumerate(links, first):
         try:
             _check_wrap(link, options)
-            place = _seam_opened(_trimmed(link, cuts[i], cuts[i + 1]), options.seam_gap)
-            before, after = (i > 0 and joints[i - 1]), (i < len(joints) and joints[i])
-            auto: SheetSide = "end2" if before and not after else "end1"
-            layout = best_layout(place.frustum, options.plan, options.wires or auto)
-            active = _active(place, layout, options.stack)
-            squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
-            conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
-            drawn = cut_sheets(
-                layout,
-                _with_materials(options.stack, conductive),
-                place,
-                title=f"{options.link}: {name}" if options.link else name,
-                kerf=options.kerf,
-                overlap=options.overlap,
-                snap=options.snap,
-                face_up=options.face_up,
-            )
-            electronics = match_electronics(*_resistances(active.frustum, conductive), options.electronics)
+            opened.append(_seam_opened(link, options.seam_gap))
         except GeometryError as exc:
-            raise GeometryError(f"{name}: {exc}") from exc
+            raise GeometryError(f"sheet {number}: {exc}") from exc
+    stack = options.stack
+    placed, refused = assemble(
+        opened,
+        options.plan,
+        options.wires,
+        thickness=stack.thickness,
+        tab_height=stack.middle(_LOWER_CONDUCTIVE),
+        gap=options.sheet_gap,
+        connector=options.connector,
+        rays=None if mesh is None else RayCaster(mesh),
+        found=bool(fits),
+        beside=beside,
+    )
+    left_out = [f"sheet {index + first}: {why}" for index, why in refused.items()]
+    if fits:
+        left_out = [f"no sheet of {_dimensions(links[index].frustum)}: {why}" for index, why in refused.items()]
+    designs = []
+    for number, one in enumerate(placed, first):
+        apart = {f"sheet {k}": sheet_gap(one.sheet, two.sheet)[0] for k, two in enumerate(placed, first) if k != number}
+        try:
+            designs.append(_sheet_design(f"sheet {number}", one, options, apart, fits[one.index] if fits else None))
+        except GeometryError as exc:
+            raise GeometryError(f"sheet {number}: {exc}") from exc
         except SensorError as exc:
-            raise GeometryError(f"{name}: {with_key_names(str(exc))}") from exc
-        designs.append(
-            SheetDesign(
-                name=name,
-                place=place,
-                layout=layout,
-                cuts=drawn,
-                active=active,
-                options=options,
-                conductive=conductive,
-                electronics=electronics,
-                next_joint=joints[i] if i < len(joints) else None,
-                fit=fits[i] if i < len(fits) else None,
-            )
-        )
-    return tuple(designs)
+            raise GeometryError(f"sheet {number}: {with_key_names(str(exc))}") from exc
+    return tuple(designs), tuple(left_out)
+
+
+def _sheet_design(
+    name: str, placed: PlacedSheet, options: DesignOptions, apart: Mapping[str, float], fit: FittedSheet | None
+) -> SheetDesign:
+    """Return a sheet with its drawings and its electronics."""
+    active = _active(placed.place, placed.layout, options.stack)
+    squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
+    conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
+    drawn = cut_sheets(
+        placed.layout,
+        _with_materials(options.stack, conductive),
+        placed.place,
+        title=f"{options.link}: {name}" if options.link else name,
+        kerf=options.kerf,
+        snap=options.snap,
+        face_up=options.face_up,
+    )
+    return SheetDesign(
+        name=name,
+        place=placed.place,
+        layout=placed.layout,
+        cuts=drawn,
+        active=active,
+        options=options,
+        conductive=conductive,
+        electronics=match_electronics(*_resistances(active.frustum, conductive), options.electronics),
+        apron=placed.apron,
+        way=placed.way,
+        gaps={other: gap for other, gap in apart.items() if gap < _NEAR_SHEET},
+        fit=fit,
+    )
 
 
 def _with_materials(stack: LayerStack, conductive: tuple[SheetMaterial, SheetMaterial]) -> LayerStack:
@@ -307,7 +342,7 @@ def _with_materials(stack: LayerStack, conductive: tuple[SheetMaterial, SheetMat
 
 
 def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
-    """Refuse layers that are too thick for the link, and a flap where there is no seam to close."""
+    """Refuse layers that are too thick for the link."""
     if min(link.frustum.radius1, link.frustum.radius2) > 0.0:
         for index, layer in enumerate(options.stack.layers):
             strain = max(options.stack.strain(link, index), key=abs)
@@ -317,9 +352,6 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
                     f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another "
                     "layers.assembly"
                 )
-    if options.overlap and link.frustum.wrap < math.tau - 1e-9:
-        wrap = math.degrees(link.frustum.wrap)
-        raise GeometryError(f"an overlap closes the seam of a full wrap, this one is of {wrap:.4g} deg: leave it out")
 
 
 def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
@@ -336,25 +368,12 @@ def _resistances(active: Frustum, conductive: tuple[SheetMaterial, SheetMaterial
     return sheet_resistances(active, conductive[0].ohms, conductive[1].ohms)
 
 
-def _trimmed(link: PlacedFrustum, start: float, end: float) -> PlacedFrustum:
-    """Return a place, shortened by lengths along the axis at its start and end [m]."""
-    if start == end == 0.0:
-        return link
-    side = link.frustum
-    if side.cos_half_angle == 0.0 or start + end >= side.height:
-        raise GeometryError(
-            f"the gap to its neighbours takes {1e3 * (start + end):.4g} mm of a sheet "
-            f"{1e3 * side.height:.4g} mm high: reduce the sheet gap"
-        )
-    return link.part(start / side.cos_half_angle, side.slant - end / side.cos_half_angle, 0.0, side.wrap)
-
-
 def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
     """Return a full wrap with a gap of the seam [m], half of it on either side of phi = 0; a partial wrap as it is."""
     side = link.frustum
     narrow = min(side.radius1, side.radius2)
     if not (math.isfinite(gap) and gap >= 0.0):
-        raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm; for a flap use overlap")
+        raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm")
     if gap == 0.0 or side.wrap < math.tau - 1e-9:
         return link
     if gap >= math.tau * narrow:
@@ -381,7 +400,7 @@ def _blind_angle(design: SheetDesign) -> float:
     return math.tau - (design.layout.active.phi2 - design.layout.active.phi1)
 
 
-def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
+def cover_seams(designs: Sequence[SheetDesign], mesh: Mesh | None = None) -> tuple[SheetDesign, ...]:
     """Add a strip over the seam of every full wrap, where the options ask for it.
 
     A strip is a sensor of its own, with four wires that leave on the same side. It is glued on the outer face of its
@@ -389,6 +408,7 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
 
     Args:
         designs: sheets, as ``design_sheets`` makes them.
+        mesh: of the link.
 
     Returns:
         the sheets, followed by their strips.
@@ -401,10 +421,14 @@ def cover_seams(designs: Sequence[SheetDesign]) -> tuple[SheetDesign, ...]:
     for design in designs:
         if design.options.cover_seam and design.place.frustum.wrap > _SEAM_TURN_SHARE * math.tau:
             plan = design.layout.plan
-            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False)
-            number = len(designs) + len(strips) + 1
+            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, cover_seam=False)
             place, offset = _strip_place(design)
-            (strip,) = design_sheets([place], options, number)
+            bodies: list[Body] = [SheetBody(d.place, d.options.stack.thickness) for d in designs if d is not design]
+            bodies += [body for d in (*designs, *strips) for body in (d.apron.body(), d.way.body())]
+            made, why = design_assembly([place], options, mesh, len(designs) + len(strips) + 1, bodies)
+            if why:
+                raise GeometryError(f"{design.name}: no room for the strip over its seam: {why[0]}")
+            (strip,) = made
             strips.append(replace(strip, above=design.name, seam_offset=offset))
     if not strips and any(design.options.cover_seam for design in designs):
         widest = max(design.place.frustum.wrap for design in designs)

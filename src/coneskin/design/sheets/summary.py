@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.cut_sheet import CutSheet
 from coneskin.geometry.drawing.electrode_layout import (
     LEAST_ACTIVE_SHARE,
-    ElectrodePlan,
     SurfaceRectangle,
-    lay_out_sheet,
+    best_layout,
 )
 from coneskin.geometry.drawing.touch_marks import touch_marks
 from coneskin.geometry.frustum import Frustum
@@ -57,22 +54,10 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
             layer.name: _round(1e3 * stack.ignored_gap(design.place, i)) for i, layer in enumerate(stack.layers)
         },
         "electronics": _electronics(design),
-        "forecast": [
-            {
-                "u_mm": _round(1e3 * step.u),
-                "along_mm": _round(1e3 * step.along, 6),
-                "around_mm": _round(1e3 * step.around, 6),
-                "azimuth_deg": _round(math.degrees(step.azimuth), 6),
-                "theta_deg": _round(math.degrees(step.theta), 6),
-            }
-            for step in design.forecasts()
-        ],
     }
     if design.above:
         data["above"] = design.above
-    if design.next_joint is not None:
-        joint = design.next_joint
-        data["gap_to_next_mm"] = {"inner": _round(1e3 * joint.inner), "outer": _round(1e3 * joint.outer)}
+    data["gaps_mm"] = {other: _round(1e3 * gap) for other, gap in design.gaps.items()}
     if design.fit is not None:
         fit = design.fit
         data["fit"] = {
@@ -277,22 +262,10 @@ def small_active_area(design: SheetDesign) -> str:
         f"{1e3 * side.slant:.1f} mm along and {math.degrees(active.phi2 - active.phi1):.0f} of "
         f"{math.degrees(side.wrap):.0f} deg around"
     )
-    narrow = _halved(layout.plan)
-    try:
-        share = lay_out_sheet(side, narrow).active_share
-    except GeometryError:  # a width of the user's own that cannot be halved
+    share = best_layout(side).active_share
+    if share <= layout.active_share:
         return text
-    advice = " ".join(
-        f"--set electrodes.{name}_mm={1e3 * getattr(narrow, name):g}"
-        for name in ("margin", "electrode", "lead", "hole")
-    )
-    return f"{text}; {advice} would leave {share:.0%}"
-
-
-def _halved(plan: ElectrodePlan) -> ElectrodePlan:
-    """Return a plan with margins and electrodes half as wide; holes do not fit there."""
-    margin, electrode = max(0.5 * plan.margin, plan.setback), 0.5 * plan.electrode
-    return replace(plan, margin=margin, electrode=electrode, lead=min(plan.lead, electrode), hole=0.0)
+    return f"{text}; without a table of electrodes their widths are chosen, and leave {share:.0%}"
 
 
 def sheet_folder(designs: tuple[SheetDesign, ...], index: int) -> Path:

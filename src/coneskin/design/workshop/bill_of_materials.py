@@ -60,7 +60,7 @@ def bill_of_materials(
         side = design.place.frustum
         strips += _STRIP_WIDTH * (2.0 * side.slant + side.wrap * (side.radius1 + side.radius2)) * 2.0
         covered += 0.5 * sum(s.outline.length for k in (1, 5) for part in design.cuts[k].parts for s in part.strokes)
-    wires = [wire for item in figures for wire in item.cable.wires]
+    wires = [wire for item in figures for wire in item.wires]
     count = len(designs)
     pins = sum(len(design.layout.holes) for design in designs)
     stack, plan = designs[0].options.stack, designs[0].layout.plan

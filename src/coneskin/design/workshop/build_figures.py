@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import GeometryError
+from coneskin.design.sheets.cable_way import CableWay, tab_foot
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.sheets.summary import sensor_toml
 from coneskin.geometry.drawing.electrode_layout import SheetLayout, SurfaceRectangle
@@ -31,12 +32,10 @@ if TYPE_CHECKING:
 #: wire that lies on the tab, stripped; in the connector's contact; and the loop behind the strain relief [m]
 STRIPPED, IN_CONTACT, LOOP = 8e-3, 4e-3, 20e-3
 _ROUND_TO = 5e-3  # m; wires are cut to multiples of it
-_TIE_SHARE = 0.5  # of the way from the rim to the connector: where the wires are tied to the link
-_MIN_CONNECTOR, _MAX_CONNECTOR = 0.03, 2.0  # m; from the rim to the connector
 
 
 @dataclass(frozen=True, slots=True)
-class _SheetWire:
+class SheetWire:
     """One wire.
 
     Attributes:
@@ -54,84 +53,17 @@ class _SheetWire:
     length: float
 
 
-@dataclass(frozen=True, slots=True)
-class CableExit:
-    """Where the wires leave the sheet.
-
-    Attributes:
-        side: of the sheet.
-        u: of the middle of the four tabs [m].
-        phi: the same [rad], in [0, 2 pi): on a full wrap it lies beside the seam.
-        tie: distance of the strain relief from the rim, away from the sheet [m].
-        connector: the same of the connector [m].
-        wires: one for each electrode, in the order of the pins.
-    """
-
-    side: str
-    u: float
-    phi: float
-    tie: float
-    connector: float
-    wires: tuple[_SheetWire, ...]
-
-
-def _cable_exit(layout: SheetLayout, connector: float = 0.06) -> CableExit:
-    """Lead the wires of a sheet to one connector.
-
-    Args:
-        layout: of the sheet.
-        connector: distance of the connector from the rim [m].
-
-    Raises:
-        GeometryError: that distance is out of range.
-    """
-    if not _MIN_CONNECTOR <= connector <= _MAX_CONNECTOR:
-        raise GeometryError(
-            f"the connector must be {_MIN_CONNECTOR * 1e3:g} to {_MAX_CONNECTOR * 1e3:g} mm from the rim, "
-            f"got {connector * 1e3:.4g} mm"
-        )
-    sheet, side = layout.sheet, layout.plan.wires
-    feet = {name: _foot(layout, name) for name in "ABCD"}
-    if side.startswith("end"):
-        # around the link by the shorter way, which on a full wrap crosses the seam
-        u = next(iter(feet.values()))[0]
-        middle = math.atan2(*(math.fsum(f(phi) for _, phi in feet.values()) for f in (math.sin, math.cos)))
-        exit_at = (u, middle % (2.0 * math.pi))
-        ways = {
-            name: abs(math.remainder(phi - middle, 2.0 * math.pi)) * sheet.radius_at(u)
-            for name, (_, phi) in feet.items()
-        }
-    else:
-        middle = math.fsum(u for u, _ in feet.values()) / 4.0
-        exit_at = (middle, feet["A"][1])
-        ways = {name: abs(u - middle) for name, (u, _) in feet.items()}
-    wires = tuple(
-        _SheetWire(name, pin, *feet[name], _cut(STRIPPED + ways[name] + connector + LOOP + IN_CONTACT))
-        for pin, name in enumerate("ABCD", 1)
-    )
-    return CableExit(side, *exit_at, _TIE_SHARE * connector, connector, wires)
-
-
-def _foot(layout: SheetLayout, name: str) -> tuple[float, float]:
-    """Return the place at the rim where an electrode is reached."""
-    tab = next((step for step in layout.foils[name] if isinstance(step, ShapeTab)), None)
-    if tab is not None:
-        return tab.u, tab.phi
-    sheet, side = layout.sheet, layout.plan.wires
-    corners = layout.foils[name]
-    if side.startswith("end"):
-        u = 0.0 if side == "end1" else sheet.slant
-        nearest = min(abs(corner.u - u) for corner in corners)
-        near = [corner.phi for corner in corners if abs(corner.u - u) <= nearest + 1e-9]
-        return u, min(near, key=lambda phi: abs(math.remainder(phi, 2.0 * math.pi)))  # beside the seam
-    phi = 0.0 if side == "edge0" else sheet.wrap
-    nearest = min(abs(corner.phi - phi) for corner in corners)
-    near = [corner.u for corner in corners if abs(corner.phi - phi) <= nearest + 1e-9]
-    return min(near), phi
-
-
-def _cut(length: float) -> float:
-    return math.ceil(length / _ROUND_TO - 1e-9) * _ROUND_TO
+def _sheet_wires(layout: SheetLayout, way: CableWay) -> tuple[SheetWire, ...]:
+    """Return the wires of a sheet, from its tabs along the rim and the way of the cable to the connector."""
+    radius = layout.sheet.radius_at(way.u)
+    wires = []
+    for pin, name in enumerate("ABCD", 1):
+        u, phi = tab_foot(layout, name)
+        around = abs(math.remainder(phi - way.phi, 2.0 * math.pi)) * radius
+        along = around if way.side.startswith("end") else abs(u - way.u)
+        length = STRIPPED + along + way.connector_length + LOOP + IN_CONTACT
+        wires.append(SheetWire(name, pin, u, phi, math.ceil(length / _ROUND_TO - 1e-9) * _ROUND_TO))
+    return tuple(wires)
 
 
 _LOWER_LAYER, _UPPER_LAYER = 1, 3  # indices of the conductive layers in the stack
@@ -208,7 +140,7 @@ class BuildFigures:
     """Figures for building one sheet.
 
     Attributes:
-        cable: its wires and where they leave.
+        wires: one for each electrode, in the order of the pins.
         pairs: what a multimeter should read between A and B, and between C and D.
         frame: counts of the untouched sensor, by field of a frame.
         placement: where it belongs on the link.
@@ -216,7 +148,7 @@ class BuildFigures:
         no_collar: a sentence for each end that has none.
     """
 
-    cable: CableExit
+    wires: tuple[SheetWire, ...]
     pairs: tuple[_PairReading, _PairReading]
     frame: dict[str, int]
     placement: SheetPlacement
@@ -225,7 +157,7 @@ class BuildFigures:
 
     def as_data(self, design: SheetDesign) -> dict[str, Any]:
         """Return the figures and the coordinates of holes and electrodes as plain data, in mm and degrees."""
-        cable, placement, feature = self.cable, self.placement, self.placement.feature
+        way, placement = design.way, self.placement
         layout, surfaces = design.layout, {"CD": design.cuts[1].surface, "AB": design.cuts[5].surface}
         return {
             "holes": [_point(u, phi) for u, phi in layout.holes],
@@ -234,33 +166,26 @@ class BuildFigures:
                 name: _outline(foil, surfaces["AB" if name in "AB" else "CD"]) for name, foil in layout.foils.items()
             },
             "cable": {
-                "side": cable.side,
-                **_point(cable.u, cable.phi),
-                "tie_mm": _mm(cable.tie),
-                "connector_mm": _mm(cable.connector),
+                "side": way.side,
+                **_point(way.u, way.phi),
+                "tie_mm": _mm(way.tie_length),
+                "connector_mm": _mm(way.connector_length),
+                "on_link": not way.hangs,
+                "tab_rise_deg": round(math.degrees(math.atan(design.apron.slope)), 1),
+                "way": [
+                    {"xyz_mm": [_mm(x) for x in point], "normal": [round(x, 5) + 0.0 for x in normal]}
+                    for point, normal in zip(way.points.tolist(), way.normals.tolist(), strict=True)
+                ],
+                "tie_at": way.tie,
                 "wires": [
                     {"electrode": w.electrode, "pin": w.pin, **_point(w.u, w.phi), "length_mm": _mm(w.length)}
-                    for w in cable.wires
+                    for w in self.wires
                 ],
             },
             "multimeter_ohm": {pair.pair: round(pair.ohms, 2) for pair in self.pairs},
             "squares": {pair.pair: round(pair.squares, 5) for pair in self.pairs},
             "untouched_frame": self.frame,
             "placement": {
-                "around_end1_mm": _mm(placement.around1),
-                "around_end2_mm": _mm(placement.around2),
-                "before_end1_mm": None if placement.before is None else _mm(placement.before),
-                "beyond_end2_mm": None if placement.beyond is None else _mm(placement.beyond),
-                "seam_direction": [round(value, 5) + 0.0 for value in placement.seam],
-                "feature": None
-                if feature is None
-                else {
-                    "radius_mm": _mm(feature.radius),
-                    "azimuth_deg": round(math.degrees(feature.azimuth), 3),
-                    "from_end1_mm": _mm(feature.height),
-                    "arc_mm": _mm(feature.arc),
-                    "at_end": feature.end,
-                },
                 "faces": [
                     {
                         "name": face.name,
@@ -305,6 +230,7 @@ def measure_build(
     mesh: Mesh | None = None,
     others: Sequence[SheetDesign] = (),
     faces: Sequence[DatumFace] = (),
+    neighbors: Sequence[SheetDesign] = (),
 ) -> BuildFigures:
     """Work out the figures for building one sheet.
 
@@ -315,16 +241,17 @@ def measure_build(
         mesh: of the link; None where it is known by its dimensions only.
         others: sheets that are on the link already when this one is put on.
         faces: flat faces of the link, from which its place is measured.
+        neighbors: all sheets of the link.
 
     Raises:
-        GeometryError: a scene would refuse its sensor, or the connector is out of range.
+        GeometryError: a scene would refuse its sensor.
     """
     return BuildFigures(
-        _cable_exit(design.layout, design.options.connector),
+        _sheet_wires(design.layout, design.way),
         _pair_readings(design),
         _expected_frame(design, index, frame),
         find_placement(design.place, mesh, () if design.above else faces),
-        *jig_collars(design, mesh, others),
+        *jig_collars(design, mesh, others, neighbors),
     )
 
 
@@ -394,13 +321,23 @@ def side_name(side: str) -> str:
     return {"end1": "end 1", "end2": "end 2", "edge0": "edge 0", "edge1": "the edge of C"}[side]
 
 
-def tie_place(design: SheetDesign, figures: BuildFigures) -> str:
-    """Return where along its side the cable leaves a sheet."""
-    cable, side = figures.cable, design.place.frustum
-    if cable.side.startswith("edge"):
-        return f"{in_mm(cable.u)} from end 1"
-    radius = side.radius_at(cable.u)
-    arc = cable.phi * radius
-    if arc > math.pi * radius:
-        return f"{in_mm(2.0 * math.pi * radius - arc)} from edge 0, against the direction of the wrap"
-    return f"{in_mm(arc)} from edge 0, in the direction of the wrap"
+def way_text(design: SheetDesign) -> str:
+    """Return where the cable leaves a sheet, and where its tie and its connector lie, as a ruler finds them."""
+    way, side = design.way, design.place.frustum
+    if way.side.startswith("edge"):
+        where = f"{in_mm(way.u)} from end 1"
+    else:
+        arc, around = way.phi * side.radius_at(way.u), 2.0 * math.pi * side.radius_at(way.u)
+        back = arc > 0.5 * around
+        way_on = "against" if back else "in"
+        where = f"{in_mm(around - arc if back else arc)} from edge 0, {way_on} the direction of the wrap"
+    parts = [f"they leave {side_name(way.side)} {where}"]
+    for what, index in (("tie", way.tie), ("connector", -1)):
+        u, phi = way.surface[index]
+        end = "end 1" if abs(u) < abs(u - side.slant) else "end 2"
+        off = -u if end == "end 1" else u - side.slant
+        turn = math.remainder(phi - way.phi, 2.0 * math.pi) * side.radius_at(min(max(u, 0.0), side.slant))
+        beyond = f"{in_mm(off)} beyond {end}" if off >= 0.0 else f"{in_mm(-off)} inwards of the line of {end}"
+        aside = f", {in_mm(abs(turn))} {'on' if turn > 0.0 else 'back'} around" if abs(turn) > 2e-3 else ""
+        parts.append(f"the {what} lies {beyond}{aside}")
+    return "; ".join(parts)

@@ -27,7 +27,7 @@ from .build_figures import (
     section_head,
     side_name,
     table_head,
-    tie_place,
+    way_text,
 )
 from .placement_text import placement_lines
 
@@ -187,8 +187,6 @@ def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "the margins of part 7, as above; on the isolation and above the active area only smooth by hand, for the "
         "roller would press the two conductive sheets together."
     )
-    if options.overlap:
-        yield f"Fold the flap of part 7, {in_mm(options.overlap)} wide, over edge 0 and fix it with {TAPE}."
     if design.layout.holes:
         yield "Cut the pins flush. Use no metal: it would short-circuit the two conductive sheets."
     if figures.collars:
@@ -208,68 +206,31 @@ def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         yield f"Wind masking tape around both rims. {SETTING}"
 
 
-_MOUNT_REACH = 10e-3  # m; half of the mount of the cable tie
-
-
-def _cable_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
+def _cable_steps(design: SheetDesign) -> Iterator[str]:
     """Yield the steps from the tabs to the connector."""
-    cable, plan = figures.cable, design.layout.plan
+    way, plan = design.way, design.layout.plan
     if plan.tab:
         yield f"Fold the tabs over {side_name(plan.wires)} outwards along the green lines, away from the link."
-    if plan.wires == "end2" and design.next_joint is not None:
-        yield "The tabs would run into the next sheet there: bend them up before that sheet is wrapped."
+    if design.apron.slope:
+        rise = math.degrees(math.atan(design.apron.slope))
+        yield f"The link stands out beyond that rim: bend the tabs up by {rise:.0f} deg, so that none lies on it."
     if plan.wires.startswith("edge"):
-        between = (
-            "between the edges before you close the wrap" if design.has_seam else "on the bare link beside that edge"
-        )
-        yield f"The tabs leave at {side_name(plan.wires)}: lead them out {between}."
-    rooms = _rooms(figures)
-    yield from _short_of_room(figures, rooms)
-    ground = "there" if rooms.get(cable.side, math.inf) < cable.tie + _MOUNT_REACH else "on the link"
-    yield (
-        f"Glue the cable-tie mount {ground}, {in_mm(cable.tie)} beyond "
-        f"{side_name(cable.side)}, at {tie_place(design, figures)}. "
-        "Lead the four wires to it flat on the link, leave a loop of 20 mm so that no pull reaches a tab, and tie them "
-        f"down. Crimp the connector {in_mm(cable.connector)} beyond the rim: pin 1 A (red), pin 2 B "
-        "(black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind the tie: nothing "
-        "moves before it; and move the joint of the arm through its whole range by hand (freedrive): nothing is "
-        "pinched or stretched."
-    )
-
-
-def _rooms(figures: BuildFigures) -> dict[str, float]:
-    """Return how far the link goes on, with nothing of it in the way, beyond each end that has a mesh [m]."""
-    place = figures.placement
-    ends = (("end1", place.before, place.free[0]), ("end2", place.beyond, place.free[1]))
-    return {end: min(room, free) for end, room, free in ends if room is not None}
-
-
-def _short_of_room(figures: BuildFigures, rooms: dict[str, float]) -> Iterator[str]:
-    """Yield what a person does where the link ends, or is in the way, before the place of tie or connector."""
-    cable, place = figures.cable, figures.placement
-    room = rooms.get(cable.side, math.inf)
-    if room >= cable.connector:
-        return
-    other = "end2" if cable.side == "end1" else "end1"
-    more = rooms.get(other, 0.0)
-    if room == place.free[cable.side == "end2"]:  # the link goes on, but not clear of the cable
+        yield f"The tabs leave at {side_name(plan.wires)}: lead them out on the bare link beside that edge."
+    ground = "on the link"
+    if way.hangs:
+        ground = "on what is bolted to the link there and moves with it, such as a flange or a cover"
         yield (
-            f"Another part of the link is in the way of the cable at edge 0, {in_mm(room)} beyond "
-            f"{side_name(cable.side)}: design again with `--seam X Y Z`, a direction in which the link goes on clear "
-            f"of it for {in_mm(cable.connector)}, or with a shorter `--set sheet.connector_mm=MM`; of a single sheet "
-            f"the wires can leave at the other end, `--set sheet.wires={other}`, where {in_mm(more)} are free."
+            f"The link ends less than {in_mm(way.connector_length)} beyond the tabs: tie and connector lie {ground}; "
+            "never on the far side of a joint. If nothing does, glue the mount on part 7, over its margin, and let the "
+            "connector hang from it."
         )
-        return
-    what = "connector lies" if room >= cable.tie + _MOUNT_REACH else "cable tie and the connector lie"
     yield (
-        f"The link ends {in_mm(max(room, 0.0))} beyond {side_name(cable.side)}, so the {what} on what is bolted to the "
-        "link there and moves with it, such as a flange or a cover; never on the far side of a joint. If nothing does, "
-        + (
-            f"design again with `--set sheet.wires={other}`, where there are {in_mm(more)} of link"
-            if more >= cable.tie + _MOUNT_REACH
-            else "glue the mount on part 7, over the margin of that end, and let the connector hang from it"
-        )
-        + "."
+        f"Lead the four wires together: {way_text(design)}. Glue the cable-tie mount {ground} there, "
+        f"{in_mm(way.tie_length)} along the cable from the rim. Lay the wires flat, leave a loop of 20 mm so that no "
+        f"pull reaches a tab, and tie them down. Crimp the connector {in_mm(way.connector_length)} from the rim: pin 1 "
+        "A (red), pin 2 B (black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind "
+        "the tie: nothing moves before it; and move the joint of the arm through its whole range by hand (freedrive): "
+        "nothing is pinched or stretched."
     )
 
 
@@ -385,7 +346,7 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
         "of its four sides. End 1 is where B is, end 2 where A is, "
         "edge 0 where D is, the other edge where C is."
     )
-    steps = [*_flat_steps(design, figures), *_wrap_steps(design, figures), *_cable_steps(design, figures)]
+    steps = [*_flat_steps(design, figures), *_wrap_steps(design, figures), *_cable_steps(design)]
     steps += _test_steps(figures, folder)
     yield ""
     yield from (f"{number}. {step}" for number, step in enumerate(steps, 1))
@@ -395,7 +356,7 @@ def guide_lines(design: SheetDesign, figures: BuildFigures, folder: str) -> Iter
     yield from _jig_lines(design, figures, folder)
     yield from section_head(f"Wires of {design.name}")
     yield from table_head("pin", "electrode", "wire", "tab at u", "tab at phi", "cut to")
-    for wire in figures.cable.wires:
+    for wire in figures.wires:
         yield (
             f"| {wire.pin} | {wire.electrode} | {WIRE_COLOURS[wire.electrode]} | {in_mm(wire.u)} | "
             f"{math.degrees(wire.phi):.2f} deg | {1e3 * wire.length:.0f} mm |"

@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab
-from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import shell_surface, widest_nearby, without_undercut
 
 from .link_excess import LinkExcess
@@ -31,46 +30,36 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-_BORDER_COLUMN = math.radians(2.0)  # step around the axis
-_SHEET_RINGS = 9  # along a sheet
 
-
-def _with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
+def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
     """Return the mesh of the link with the outer faces of the sheets that it bears already."""
-    corners, faces = [mesh.vertices], [mesh.faces]
-    for other in others:
-        outer = PlacedFrustum(other.place.frustum).parallel(other.options.stack.thickness).frustum
-        shift = -other.options.stack.thickness * outer.sin_half_angle
-        phi = np.linspace(0.0, outer.wrap, max(8, math.ceil(outer.wrap / _BORDER_COLUMN)) + 1)
-        rings = [_ring(outer, u, phi, shift) for u in np.linspace(0.0, outer.slant, _SHEET_RINGS)]
-        start = sum(len(block) for block in corners)
-        index = start + np.arange(len(rings) * len(phi)).reshape(len(rings), len(phi))
-        a, b, c, d = index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]
-        corners.append(other.place.link_frustum.apply_all(np.concatenate(rings)))
-        faces.append(np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3))
     if not others:
         return mesh
-    return Mesh(np.concatenate(corners), np.concatenate(faces), mesh.source, mesh.unit)
+    corners = np.concatenate([mesh.triangles, *(other.outer_triangles() for other in others)]).reshape(-1, 3)
+    return Mesh(corners, np.arange(len(corners)).reshape(-1, 3), mesh.source, mesh.unit)
 
 
-def _ring(outer: Frustum, u: float, phi: Floats, shift: float) -> Floats:
-    radius = outer.radius_at(float(u))
-    return np.column_stack(
-        [radius * np.cos(phi), radius * np.sin(phi), np.full(len(phi), u * outer.cos_half_angle + shift)]
-    )
-
-
-def _meets_neighbour(design: SheetDesign, others: Sequence[SheetDesign], end: int) -> bool:
-    """Tell whether another sheet begins where this one ends."""
-    if end == 2:
-        return design.next_joint is not None
-    start = design.place.link_frustum.translation
-    for other in others:
-        if other.next_joint is not None and not other.above:
-            far = other.place.link_frustum.apply((0.0, 0.0, other.place.frustum.height))
-            if math.dist(far, start) < other.next_joint.inner + 1e-6:
-                return True
-    return False
+def _blocked(design: SheetDesign, neighbors: Sequence[SheetDesign], end: int) -> str:
+    """Say what of other sheets lies where the lip of a collar would begin; empty where nothing does."""
+    side, thickness = design.place.frustum, design.options.stack.thickness
+    phi = np.linspace(0.0, side.wrap, 181)
+    for other in neighbors:
+        if other.above or other.name == design.name:
+            continue
+        sheet = SheetBody(other.place, thickness)
+        bodies = (
+            (sheet, "it meets the sheet beside it: push it against that"),
+            (other.apron.body(), _WIRES),
+            (other.way.body(), _WIRES),
+        )
+        for body, why in bodies:
+            for away in (0.25 * _MIN_LIP, 0.75 * _MIN_LIP):
+                u = -away if end == 1 else side.slant + away
+                points, normals = design.place.place(np.full(len(phi), u), phi)
+                met = [body.near(points + lift * normals, 0.0) for lift in (0.5 * thickness, thickness)]
+                if np.any(met):
+                    return why.format(other.name)
+    return ""
 
 
 _LIP_ROWS = 61  # along the lip
@@ -119,6 +108,7 @@ _STOP_ROW = 0.25e-3  # m; step by which the end of a lip before what stands out 
 _FLUSH_DISTANCE = 40e-3  # m; an outermost face nearer than this is the datum of the lip
 _MAX_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
 _MIN_LIP_PIECE = 1e-3  # m; a lip is left out where it would be shorter
+_WIRES = "the tabs or wires of {0} are in the way: mark the line of the rim, and push the sheet against that"
 _MIN_LIP = 4e-3  # m; a lip that is shorter everywhere holds nothing
 _SLOT_WIDTH = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
 _CHANNEL_HEIGHT = 8e-3  # m; height of the way out for tabs with their wires
@@ -175,7 +165,10 @@ class Collar:
 
 
 def jig_collars(
-    design: SheetDesign, mesh: Mesh | None = None, others: Sequence[SheetDesign] = ()
+    design: SheetDesign,
+    mesh: Mesh | None = None,
+    others: Sequence[SheetDesign] = (),
+    neighbors: Sequence[SheetDesign] = (),
 ) -> tuple[tuple[Collar, ...], tuple[str, ...]]:
     """Make the collars of a sheet.
 
@@ -183,6 +176,7 @@ def jig_collars(
         design: the sheet.
         mesh: of the link, in the frame of the sheets; None where it is known by its dimensions only.
         others: sheets that are on the link already when this one is put on.
+        neighbors: all sheets of the link.
 
     Returns:
         the collars, and a sentence for each end that has none.
@@ -198,10 +192,10 @@ def jig_collars(
         return (), (f"{design.name} is too flat for collars: weigh it down with a board of its shape",)
     collars: list[Collar] = []
     without: list[str] = []
-    body = None if mesh is None or plan.surface == "cone" else _with_sheets(mesh, others)
+    body = None if mesh is None or plan.surface == "cone" else with_sheets(mesh, others)
     for end in (1, 2):
-        if _meets_neighbour(design, others, end):
-            without.append(f"at end {end} it meets the sheet beside it: push it against that")
+        if why := _blocked(design, neighbors, end):
+            without.append(f"at end {end} {why}")
             continue
         try:
             collars.append(_Builder(design, mesh, body, end).collar())

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.ray_casting import RayCaster
 
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
@@ -186,32 +185,10 @@ def _area(face: DatumFace) -> float:
     return face.size[0] * face.size[1]
 
 
-_CABLE_HEIGHT = 4e-3  # m; height at which a cable on the link must not meet another part of it
-_STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
 _ALIKE_BENDS = 0.01  # bends of two strips that differ by less are alike: they are fitted
 _ALIKE_STRIPS = 0.05  # a strip that is bent less than another by less belongs to it
-_OUTERMOST_DEPTH = 1e-3  # m; points so near to the outermost one are its neighbours
 _MIN_AXIS_SLOPE = 0.35  # mm of a height for each mm along the axis: it then fixes the place along the axis
 _SQUARE_SINE = math.sin(math.radians(1.0))  # an axis is held square, or along a face, by a try square
-
-
-@dataclass(frozen=True, slots=True)
-class LinkFeature:
-    """The point of a link that is furthest from the axis of a sheet: a flange, an elbow, a cover.
-
-    Attributes:
-        radius: distance from the axis [m].
-        azimuth: from the seam [rad], in [0, 2 pi).
-        height: along the axis from end 1 of the sheet, positive towards end 2 [m].
-        arc: from the seam to its azimuth, around the sheet at the end nearer to it [m].
-        end: that end, 1 or 2.
-    """
-
-    radius: float
-    azimuth: float
-    height: float
-    arc: float
-    end: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,13 +202,10 @@ class SheetPlacement:
             there is no mesh.
         beyond: from end 2 to the outermost point of the link on its side [m]; None where there is no mesh.
         seam: direction in which edge 0 faces, in the frame of the link.
-        feature: what stands out, from which the seam is measured; None where nothing does.
         faces: flat faces of the link from which places are measured.
         heights: distances from these faces; empty where there is none.
         tilted: True where the axis is square to no face and along none, and the heights fix the place along it: what a
             ruler would measure along the axis is then left out.
-        free: from end 1 and from end 2, along the side and outwards at edge 0, to another part of the link [m];
-            infinite where there is none.
     """
 
     around1: float
@@ -239,11 +213,9 @@ class SheetPlacement:
     before: float | None
     beyond: float | None
     seam: tuple[float, float, float]
-    feature: LinkFeature | None
     faces: tuple[DatumFace, ...] = ()
     heights: tuple[_DatumHeight, ...] = ()
     tilted: bool = False
-    free: tuple[float, float] = (math.inf, math.inf)
 
     @property
     def around_fixed(self) -> bool:
@@ -263,22 +235,8 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
     around = side.wrap * side.radius1, side.wrap * side.radius2
     seam, axis = pose.rotate((1.0, 0.0, 0.0)), pose.rotate((0.0, 0.0, 1.0))
     if mesh is None:
-        return SheetPlacement(*around, None, None, seam, None)
-    x, y, z = pose.inverse().apply_all(mesh.vertices).T
-    radius = np.sqrt(x * x + y * y)
-    feature = None
-    furthest = int(radius.argmax())
-    if not place.bends and radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
-        near = radius > radius[furthest] - _OUTERMOST_DEPTH
-        first = math.atan2(y[furthest], x[furthest])
-        turns = (np.arctan2(y[near], x[near]) - first + math.pi) % (2.0 * math.pi) - math.pi
-        # a collar stands out all around: it has no azimuth
-        if float(np.ptp(turns)) < 0.5 * math.pi:
-            azimuth = (first + 0.5 * float(turns.min() + turns.max())) % (2.0 * math.pi)
-            height = float(np.median(z[near]))
-            end = 1 if height < 0.5 * side.height else 2
-            arc = azimuth * (side.radius1 if end == 1 else side.radius2)
-            feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
+        return SheetPlacement(*around, None, None, seam)
+    z = pose.inverse().apply_all(mesh.vertices)[:, 2]
     usable = _measured_faces(place, faces)
     along = [abs(math.fsum(a * b for a, b in zip(face.normal, axis, strict=True))) for face in usable]
     held = any(cosine < _SQUARE_SINE or cosine > math.sqrt(1.0 - _SQUARE_SINE**2) for cosine in along)
@@ -287,22 +245,10 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
         -float(z.min()),
         float(z.max()) - side.height,
         seam,
-        feature,
         usable,
         _datum_heights(place, usable) if usable else (),
         max(along, default=0.0) >= _MIN_AXIS_SLOPE and not held,
-        _free_ways(place, mesh),
     )
-
-
-def _free_ways(place: PlacedFrustum, mesh: Mesh) -> tuple[float, float]:
-    """Return how far a cable at edge 0 can go on beyond end 1 and end 2 before it meets the link [m]."""
-    side = place.frustum
-    u = np.array([0.0, side.slant])
-    points, normals = place.place(u, np.zeros(2))
-    way = (points[1] - points[0]) / np.linalg.norm(points[1] - points[0])
-    distances, _ = RayCaster(mesh).cast(points + _CABLE_HEIGHT * normals, np.array([-way, way]))
-    return float(distances[0]), float(distances[1])
 
 
 def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:
