@@ -93,3 +93,10 @@ def test_no_eye_mistakes_a_touched_sheet_or_a_stopped_arm(eye: str) -> None:
     phases = [tuple(bytes.fromhex(PHASE_COLOURS[kind][1:])) for kind in ("active", "moving", "stopped")]
     for pair in (*combinations(SHEET_COLOURS, 2), *combinations(phases, 2), (SHEET_COLOURS[1], (255, 255, 255))):
         assert contrast(*pair, eye) >= 3.0, pair
+
+
+def test_a_message_that_comes_again_with_other_numbers_is_one_entry() -> None:
+    said = [GuardEvent(EventName.MESSAGE, time, {"what": f"it waits (load {time})"}) for time in (9.4, 10.5, 11.6)]
+    ((first, words),) = stop_entries(said, 0.0)
+    assert first is said[0]
+    assert words.endswith("it waits (load 9.4) (3 times)")

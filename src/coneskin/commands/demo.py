@@ -174,6 +174,7 @@ def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     if missing:
         print(f"recording: {missing}")
     print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))
+    print_hint(f"see it in a browser: coneskin view {shlex.quote(str(folder))}")
     print_hint(f"next: coneskin replay {shlex.quote(str(folder))} --events")
 
 

@@ -148,7 +148,7 @@ def _entry(group: Sequence[GuardEvent], events: Sequence[GuardEvent], zero: floa
 
 def _stem(event: GuardEvent) -> str:
     """Return what two events have in common that tell of the same: their words without numbers."""
-    said = event.details.get("what" if event.name == EventName.FAULT else "why")
+    said = event.details.get("what", event.details.get("why"))
     return re.sub(r"[\d.]+", "#", _cause_and_remedy(said)[0]) if isinstance(said, str) else f"{event.name} {event.time}"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RecordingError
+from coneskin.core.recording.reader import parts_of
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
@@ -45,6 +46,7 @@ class Moment:
 
 
 _BASE_DISTANCE = 0.75  # of the arms' reach, between two bases
+_MAX_RUN_SIZE = 200_000_000  # bytes of a recording: about an hour, which takes 3 GB of memory on a page
 _ZERO_EVENTS = (EventName.CONTACT, EventName.STOPPING)  # by which two runs are laid side by side
 
 
@@ -101,9 +103,18 @@ def read_courses(paths: Sequence[Path]) -> list[RunCourse]:
     """Read runs: one as it is, several side by side, each with its first touch at the time 0.
 
     Raises:
-        RecordingError: a run cannot be read, or nothing was recorded in it.
+        RecordingError: a run cannot be read, nothing was recorded in it, or it is too long for a page.
         SceneError: this version of coneskin cannot read its scene.
     """
+    for path in paths:
+        size = sum(
+            part.stat().st_size for part in parts_of(path / "run.rec" if path.is_dir() else path) if part.exists()
+        )
+        if size > _MAX_RUN_SIZE:
+            raise RecordingError(
+                f"{path} has {size / 1e6:.3g} MB, and a page shows at most {_MAX_RUN_SIZE / 1e6:g} MB of a run; "
+                f"take the part that matters: coneskin runs cut {path} --around SECONDS --keep SECONDS"
+            )
     runs = [read_run(path) for path in paths]
     found = [_read_course(run, str(path), len(runs) > 1) for run, path in zip(runs, paths, strict=True)]
     apart = _BASE_DISTANCE * max(course.stage.reach for course in found)

@@ -85,6 +85,7 @@ class StageNodes:
         self._frames = {link: scene.add_frame(f"{root}/link {link}", show_axes=False) for link in stage.links}
         for solid in joined(stage.solids):
             _add_solid(scene, f"{root}/link {solid.link}/{_node(solid.name)}", solid)
+        self._poses: dict[int, Pose] = {}
         self._bodies = []
         for number, body in enumerate(stage.bodies):
             self._bodies.append(scene.add_frame(f"{root}/body {number}", show_axes=False))
@@ -107,8 +108,9 @@ class StageNodes:
     def show(self, moment: Moment) -> None:
         """Move and colour the nodes; what has not changed is not sent."""
         for link, frame in self._frames.items():
-            pose = moment.poses[link]
-            frame.wxyz, frame.position = quaternion(pose), pose.translation
+            if (pose := moment.poses[link]) != self._poses.get(link):
+                self._poses[link] = pose
+                frame.wxyz, frame.position = quaternion(pose), pose.translation
         for frame, moved in zip(self._bodies, moment.bodies, strict=True):
             frame.position = moved
         for sheet in self._stage.sheets:

@@ -137,6 +137,13 @@ def test_the_covariance_is_told_only_while_the_estimate_stands(monkeypatch):
     assert touch.detector.reading_now.covariance is not None
 
 
+def test_the_first_certain_place_of_a_press_that_grows_is_told_with_its_covariance(monkeypatch):
+    touch = CountedTouch(monkeypatch)
+    events = [event for n in range(20) for event in touch.feed(press(min(2e-4 * 1.4**n, 5e-3)))]
+    first = next(event for event in events if event.location_valid)
+    assert first.covariance is not None
+
+
 def test_a_rest_sharpens_the_place_with_few_estimates(monkeypatch):
     touch = CountedTouch(monkeypatch)
     told = []
