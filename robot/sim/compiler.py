@@ -7,7 +7,6 @@ control cycles, and a client that monitors the age of the controller's data woul
 from __future__ import annotations
 
 import contextlib
-import marshal
 import pickle
 import signal
 import struct
@@ -179,12 +178,10 @@ def _ask(worker: subprocess.Popen[bytes], text: str) -> Translation | ScriptErro
     try:
         _send(worker.stdin, pickle.dumps(text))
         (length,) = _LENGTH_PREFIX.unpack(worker.stdout.read(_LENGTH_PREFIX.size))
-        made, code = pickle.loads(worker.stdout.read(length))
+        made: Translation | ScriptError = pickle.loads(worker.stdout.read(length))
     finally:
         deadline.cancel()
-    if code:
-        return Translation(code=marshal.loads(code), text=text, **made)
-    return ScriptError(made.pop("message"), **made)
+    return made
 
 
 def serve() -> None:
@@ -195,16 +192,14 @@ def serve() -> None:
 
 
 def _serve(source: IO[bytes], target: IO[bytes]) -> None:
-    answer: tuple[dict[str, object], bytes]
+    made: Translation | ScriptError
     while len(head := source.read(_LENGTH_PREFIX.size)) == _LENGTH_PREFIX.size:
         text = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
         try:
             made = _translate(text)
-            facts = {name: getattr(made, name) for name in ("name", "secondary", "lines", "names")}
-            answer = (facts, marshal.dumps(made.code))
         except ScriptError as exc:
-            answer = ({"message": str(exc), "title": exc.title, "line": exc.line, "column": exc.column}, b"")
-        _send(target, pickle.dumps(answer))
+            made = exc
+        _send(target, pickle.dumps(made))
 
 
 def _translate(text: str) -> Translation:

@@ -10,6 +10,7 @@ Source: Universal Robots, "The URScript Programming Language", modules motion an
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from inspect import isgeneratorfunction
 from typing import Any
@@ -22,32 +23,19 @@ from coneskin.robot.arm.model import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.value_functions import MAX_LINE, ValueFunctions, written
-from coneskin.robot.sim.urscript.values import (
-    Array,
-    PoseValue,
-    number,
-    numbers,
-    pose_of,
-    show,
-    values_of,
-)
+from coneskin.robot.sim.urscript.values import Array, PoseValue, number, numbers, pose_of, show, values_of
 
 from .force_functions import ForceFunctions
 from .io_functions import IoFunctions, index_of
 from .moves import MoveFunctions, Wait
+from .script_host import ScriptHost
 from .socket_functions import SocketFunctions
 from .states import PopupNotice, TextNotice
 
 _NOT_SIMULATED = (math.nan,) * 6  # value of what is not simulated, for six joints
 
 
-class Builtins(
-    MoveFunctions,
-    IoFunctions,
-    SocketFunctions,
-    ForceFunctions,
-    ValueFunctions,
-):
+class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, ValueFunctions):
     """All URScript functions, bound to one program of one controller."""
 
     @classmethod
@@ -94,10 +82,6 @@ class Builtins(
         self._host.log("popup", text=show(s), title=show(title))
         self._host.tell(PopupNotice(show(title), show(s), bool(warning), bool(error)))
 
-    def get_steptime(self) -> float:
-        """Return the control cycle [s]."""
-        return self._host.steptime
-
     # kinematics
 
     def get_inverse_kin_has_solution(self, x: Any, *_: Any) -> bool:
@@ -109,54 +93,6 @@ class Builtins(
         tool = self._arm.tcp if tcp is None else pose_of(tcp)
         return values_of(forward(self._arm.model, self._arm.q if q is None else q) @ tool)
 
-    def get_actual_tcp_pose(self) -> PoseValue:
-        """Return the tool pose."""
-        return values_of(self._arm.tcp_pose(self._arm.measured.q))
-
-    def get_target_tcp_pose(self) -> PoseValue:
-        """Return the tool pose that is commanded."""
-        return values_of(self._arm.tcp_pose())
-
-    get_target_tcp_pose_along_path = get_target_tcp_pose  # no path has an offset
-
-    def get_actual_tool_flange_pose(self) -> PoseValue:
-        """Return the flange pose."""
-        return values_of(forward(self._arm.model, self._arm.measured.q))
-
-    def get_actual_tcp_speed(self) -> Array:
-        """Return the velocity of the tool [m/s, rad/s]."""
-        return Array(self._arm.measured_twist())
-
-    def get_target_tcp_speed(self) -> Array:
-        """Return the velocity of the tool that is commanded [m/s, rad/s]."""
-        return Array(self._arm.twist())
-
-    get_target_tcp_speed_along_path = get_target_tcp_speed
-
-    def get_actual_joint_positions(self) -> Array:
-        """Return the joint positions [rad]."""
-        return Array(self._arm.measured.q)
-
-    get_joint_positions = get_actual_joint_positions
-
-    def get_target_joint_positions(self) -> Array:
-        """Return the joint positions that are commanded [rad]."""
-        return Array(self._arm.q)
-
-    def get_actual_joint_speeds(self) -> Array:
-        """Return the joint speeds [rad/s]."""
-        return Array(self._arm.measured.qd)
-
-    def get_target_joint_speeds(self) -> Array:
-        """Return the joint speeds that are commanded [rad/s]."""
-        return Array(self._arm.qd)
-
-    def get_target_joint_accelerations(self) -> Array:
-        """Return the joint accelerations [rad/s^2]."""
-        return Array(self._arm.qdd)
-
-    get_actual_joint_accelerations = get_target_joint_accelerations
-
     def get_actual_joint_positions_history(self, steps: int = 0) -> Array:
         """Return the joint positions of some cycles ago [rad]."""
         history = self._host.history
@@ -167,7 +103,7 @@ class Builtins(
         motion = self._arm.motion
         if isinstance(motion, Path):
             return values_of(motion.goal)
-        return self.get_actual_tcp_pose()
+        return values_of(self._arm.tcp_pose(self._arm.measured.q))
 
     def get_jacobian(self, q: Any = None, tcp: Any = None) -> Array:
         """Return the Jacobian of the tool at joint positions, 6 x 6; by default at the present ones with its tool."""
@@ -204,14 +140,6 @@ class Builtins(
         standing = joint_torques(model, inertia, here, ZERO_VELOCITY, ZERO_VELOCITY)
         return Array(a - b for a, b in zip(moving, standing, strict=True))
 
-    def get_joint_torques(self) -> Array:
-        """Return six NaN: outer torques are not simulated."""
-        return Array(_NOT_SIMULATED)
-
-    def is_steady(self) -> bool:
-        """Return whether the arm stands."""
-        return not self._arm.turning
-
     def is_within_safety_limits(self, where: Any) -> bool:
         """Return whether joint positions are within their limits, or such positions reach a tool pose."""
         model = self._arm.model
@@ -227,28 +155,10 @@ class Builtins(
         """Set the tool centre point in the flange frame."""
         self._arm.tcp = pose_of(numbers(pose, 6, "a tool centre point"))
 
-    def get_tcp_offset(self) -> PoseValue:
-        """Return the tool centre point in the flange frame."""
-        return values_of(self._arm.tcp)
-
     def get_joint_temp(self, j: int) -> float:
         """Return the temperature of a joint [degrees Celsius]: a constant."""
         index_of(j, 6)
         return 30.0
-
-    def get_controller_temp(self) -> float:
-        """Return the temperature of the control box [degrees Celsius]: a constant."""
-        return 30.0
-
-    get_tool_temp = get_controller_temp
-
-    def get_tool_current(self) -> float:
-        """Return the current of the tool [A]: a constant."""
-        return 0.0
-
-    def get_tool_accelerometer_reading(self) -> Array:
-        """Return the acceleration of the tool [m/s^2]: that of an arm at rest, as RTDE has it."""
-        return Array((0.0, 0.0, -9.81))
 
     # safety and payload
 
@@ -281,14 +191,47 @@ class Builtins(
         """Set the centre of gravity of the payload [m]."""
         self.set_payload(self._host.payload, CoG)
 
-    def get_target_payload(self) -> float:
-        """Return the payload [kg]."""
-        return self._host.payload
 
-    def get_target_payload_cog(self) -> Array:
-        """Return the centre of gravity of the payload [m]."""
-        return Array(self._host.payload_cog)
+def _add_reading(name: str, read: Callable[[ScriptHost], Any]) -> None:
+    """Add a function that takes nothing, and returns what it reads of the controller."""
+    setattr(Builtins, name, lambda self: read(self._host))
 
-    def get_target_payload_inertia(self) -> Array:
-        """Return the inertia of the payload [kg m^2]."""
-        return Array(self._host.payload_inertia)
+
+#: name -> what the function returns: positions and speeds of joints [rad], [rad/s], of the tool [m], [m/s], and so on
+_READINGS: dict[str, Callable[[ScriptHost], Any]] = {
+    "get_steptime": lambda host: host.steptime,
+    # measured by the arm
+    "get_actual_joint_positions": lambda host: Array(host.arm.measured.q),
+    "get_joint_positions": lambda host: Array(host.arm.measured.q),
+    "get_actual_joint_speeds": lambda host: Array(host.arm.measured.qd),
+    "get_actual_tcp_pose": lambda host: values_of(host.arm.tcp_pose(host.arm.measured.q)),
+    "get_actual_tool_flange_pose": lambda host: values_of(forward(host.arm.model, host.arm.measured.q)),
+    "get_actual_tcp_speed": lambda host: Array(host.arm.measured_twist()),
+    "is_steady": lambda host: not host.arm.turning,
+    # commanded; no path has an offset
+    "get_target_joint_positions": lambda host: Array(host.arm.q),
+    "get_target_joint_speeds": lambda host: Array(host.arm.qd),
+    **dict.fromkeys(
+        ("get_target_joint_accelerations", "get_actual_joint_accelerations"), lambda host: Array(host.arm.qdd)
+    ),
+    **dict.fromkeys(
+        ("get_target_tcp_pose", "get_target_tcp_pose_along_path"), lambda host: values_of(host.arm.tcp_pose())
+    ),
+    **dict.fromkeys(("get_target_tcp_speed", "get_target_tcp_speed_along_path"), lambda host: Array(host.arm.twist())),
+    "get_tcp_offset": lambda host: values_of(host.arm.tcp),
+    # set by programs and clients
+    "get_target_payload": lambda host: host.payload,
+    "get_target_payload_cog": lambda host: Array(host.payload_cog),
+    "get_target_payload_inertia": lambda host: Array(host.payload_inertia),
+    "get_gravity": lambda host: Array(host.gravity),
+    "get_tcp_force": lambda host: Array(host.inputs.wrench()),
+    "force": lambda host: math.hypot(*host.inputs.wrench()[:3]),
+    # constants of sensors that are not simulated
+    **dict.fromkeys(("get_controller_temp", "get_tool_temp"), lambda _: 30.0),
+    "get_tool_current": lambda _: 0.0,
+    "get_tool_accelerometer_reading": lambda _: Array((0.0, 0.0, -9.81)),
+    "get_joint_torques": lambda _: Array(_NOT_SIMULATED),
+    "get_freedrive_status": lambda _: 0,  # it is not restricted by a position close to a limit
+}
+for _name, _read in _READINGS.items():
+    _add_reading(_name, _read)

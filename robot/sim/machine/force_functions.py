@@ -9,11 +9,10 @@ Source: Universal Robots, "The URScript Programming Language", modules motion, i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator
 from typing import Any
 
-from coneskin.robot.sim.urscript.values import Array, ScriptError, number, numbers, show
+from coneskin.robot.sim.urscript.values import ScriptError, number, numbers, show
 
 from .script_host import CallingProgram, ScriptHost
 from .states import ErrorNotice, Report
@@ -50,14 +49,6 @@ class ForceFunctions:
 
     ft_rtde_input_enable = enable_external_ft_sensor
 
-    def get_tcp_force(self) -> Array:
-        """Return force [N] and torque [N m] at the tool."""
-        return Array(self._host.inputs.wrench())
-
-    def force(self) -> float:
-        """Return the length of the force at the tool [N]."""
-        return math.hypot(*self._host.inputs.wrench()[:3])
-
     # modes that follow a force
 
     def force_mode(self, task_frame: Any, selection_vector: Any, wrench: Any, type: Any, limits: Any) -> None:
@@ -86,10 +77,6 @@ class ForceFunctions:
         """Return the gain of force mode."""
         return self._program.gain_scaling
 
-    def get_freedrive_status(self) -> int:
-        """Return 0: freedrive is not restricted by a position close to a limit."""
-        return 0
-
     def direct_torque(
         self,
         torque: Any,
@@ -107,7 +94,3 @@ class ForceFunctions:
     def set_gravity(self, d: Any) -> None:
         """Set the direction of gravity [m/s^2]: no effect on an arm that follows its path exactly."""
         self._host.gravity = tuple(numbers(d, 3, "gravity"))
-
-    def get_gravity(self) -> Array:
-        """Return gravity [m/s^2]: upward, as the acceleration that an arm at rest feels."""
-        return Array(self._host.gravity)

@@ -9,6 +9,7 @@ Source: Universal Robots, "The URScript Programming Language", page "Thread sche
 
 from __future__ import annotations
 
+import marshal
 import time
 from collections.abc import Callable, Generator, Iterator
 from inspect import isgenerator
@@ -83,7 +84,7 @@ class Program:
         }
         builtins = Builtins(host, self)
         space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.names()}
-        exec(translation.code, space)  # the text was parsed, and nothing but its own names is in it
+        exec(marshal.loads(translation.code), space)  # the text was parsed, and nothing but its own names is in it
         self._translation = translation
         self._main = Thread("main", space["main"]())
         self.threads = [self._main]

@@ -20,15 +20,7 @@ from urllib.parse import urlsplit
 from xml.parsers.expat import ExpatError
 
 from coneskin.robot.sim.urscript.value_functions import text_of
-from coneskin.robot.sim.urscript.values import (
-    Array,
-    PoseValue,
-    ScriptError,
-    Struct,
-    make_list,
-    number,
-    show,
-)
+from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 
 from .script_host import CallingProgram, ScriptHost
 from .script_socket import ScriptSocket, may_connect

@@ -88,14 +88,8 @@ def robot_bits(mode: RobotMode, program: bool) -> int:
 Version = tuple[int, int]
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
-PORTS = {
-    "RTDE": 30004,
-    "dashboard": 29999,
-    "primary": 30001,
-    "secondary": 30002,
-    "realtime": 30003,
-    "interpreter": 30020,
-}
+PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
+PORTS |= {"interpreter": 30020}
 FIRST_X = 10  #: major version of PolyScope X
 #: arm that is simulated where none is named
 DEFAULT_MODEL = "UR5e"

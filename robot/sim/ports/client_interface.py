@@ -42,15 +42,8 @@ from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
 from coneskin.robot.sim.urscript.values import ScriptError, values_of
 
 MESSAGE = 20  #: kind of a packet that holds one message
-_TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE, _ERROR_MESSAGE, _KEY_MESSAGE, _FAILED_MESSAGE = (
-    0,
-    2,
-    3,
-    5,
-    6,
-    7,
-    10,
-)
+_TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE = 0, 2, 3, 5  # kinds of messages
+_ERROR_MESSAGE, _KEY_MESSAGE, _FAILED_MESSAGE = 6, 7, 10
 _RUNTIME, _INTERFACE = 253, 254  # source of a message: the runtime machine, the interface itself
 _NO_DATA = 0  # of a report: it carries no further value
 _MAX_TITLE_LENGTH = 255  # bytes: its length is one byte
@@ -166,13 +159,7 @@ _ROBOT_TYPES = {
 }
 _ROBOT_SUBTYPES = {3: 0, 5: 3}  # major version of the software -> sub-type, as recorded from 5.24
 _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
-_DEFAULT_MOTION = (
-    math.radians(60.0),
-    math.radians(80.0),
-    0.25,
-    1.2,
-    0.25,
-)  # joint and tool v and a, and the radius to them
+_DEFAULT_MOTION = (math.radians(60.0), math.radians(80.0), 0.25, 1.2, 0.25)  # joint and tool v and a, and their radius
 
 
 def _robot_type(model: ArmModel) -> int:

@@ -144,15 +144,16 @@ class RtdeOutputs:
         c = self._c
         if name in self._getters:
             return self._getters[name]
-        if name.startswith("output_int_register_"):
-            index = int(name.rsplit("_", 1)[1])
-            return lambda: c.output_ints[index]
-        if name.startswith("output_double_register_"):
-            index = int(name.rsplit("_", 1)[1])
-            return lambda: c.output_doubles[index]
-        if name.startswith("output_bit_register_"):
-            index = int(name.rsplit("_", 1)[1])
-            return lambda: c.terminals.output_bits >> index & 1
+        register, _, digits = name.rpartition("_")
+        if register == "output_bit_register":
+            return lambda: c.terminals.output_bits >> int(digits) & 1
+        registers: dict[str, Sequence[float]] = {
+            "output_int_register": c.output_ints,
+            "output_double_register": c.output_doubles,
+        }
+        if register in registers:
+            values, index = registers[register], int(digits)
+            return lambda: values[index]
         if name in c.inputs and name.startswith("input_"):
             return lambda: c.inputs[name]
         kind = VARIABLES[name]

@@ -18,12 +18,12 @@ functions, scoping rules, threads) and its page "Thread scheduling".
 
 from __future__ import annotations
 
+import marshal
 import re
 from collections import deque
 from collections.abc import Generator, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
-from types import CodeType
 from typing import Any
 
 from .syntax import ExpressionParser, line_error
@@ -57,7 +57,7 @@ class Translation:
     Attributes:
         name: name in the program's text.
         secondary: True for a ``sec`` program, which runs beside the main one and cannot move the arm.
-        code: Python module that defines ``main``, a generator function, and the threads and functions it uses.
+        code: marshalled Python module that defines ``main``, a generator function, and the functions that it uses.
         text: of the program.
         lines: line of the program for each line of the module.
         names: what it defines.
@@ -65,7 +65,7 @@ class Translation:
 
     name: str
     secondary: bool
-    code: CodeType
+    code: bytes
     text: str
     lines: tuple[int, ...]
     names: Names
@@ -74,7 +74,7 @@ class Translation:
         """Return what went wrong while it ran as an error that names the line of the program."""
         number, trace = 0, problem.__traceback__
         while trace is not None:
-            if trace.tb_frame.f_code.co_filename == self.code.co_filename:
+            if trace.tb_frame.f_code.co_filename == f"<{self.name}>":
                 number = self.lines[trace.tb_lineno - 1]
             trace = trace.tb_next
         words = str(problem) if isinstance(problem, ScriptError) else f"{type(problem).__name__}: {problem}"
@@ -191,7 +191,7 @@ class _Translator(ExpressionParser):
             self._module.append((f"main = f_{main.name}", 0))
         else:
             main = self._statements()
-        code = compile("\n".join(line for line, _ in self._module), f"<{main.name}>", "exec")
+        code = marshal.dumps(compile("\n".join(line for line, _ in self._module), f"<{main.name}>", "exec"))
         names = Names(frozenset(self._defined | self._known.functions), frozenset(self._globals | main.assigned))
         return Translation(
             main.name, main.kind == "sec", code, self._text, tuple(number for _, number in self._module), names
@@ -471,7 +471,7 @@ class Interpreter:
                 yield
                 continue
             self.executed, made = self._queue.popleft()
-            exec(made.code, self._space)
+            exec(marshal.loads(made.code), self._space)
             try:
                 yield from self._space["main"]()
             except (ScriptError, ArithmeticError, LookupError, TypeError, ValueError, NameError) as exc:
