@@ -24,6 +24,7 @@ from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
+from coneskin.robot.sim.urscript.values import solve_linear
 
 from .plant import KinematicPlant, PlantState
 
@@ -76,6 +77,7 @@ _HELD_SHARE = 1.25  # of its highest torque, that a joint at rest withstands by 
 _FADING_POWER = 1.0 / 3.0  # of speed over highest speed, with which a stop of category 0 softens; fitted
 _LEAST_SHARE = 1e-3  # of a joint's highest speed; below, a stop softens no further
 _MAX_PAYLOAD, _MAX_PAYLOAD_LEVER = 100.0, 2.0  # kg, m; a payload beyond is none of an arm, and is not simulated
+_SMALLEST_PIVOT = 1e-4  # of the Jacobian; below, the position is singular
 _BRAKING_CYCLES = 4  # between two calculations of what the motors can do
 
 
@@ -307,33 +309,10 @@ class SimulatedArm:
         Raises:
             MotionFault: the arm is in, or within 1e-4 of, a singular position.
         """
-        return _solve_linear(self.jacobian(), twist)
-
-
-def _solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float]) -> list[float]:
-    """Solve six linear equations (Gauss, partial pivoting).
-
-    Raises:
-        MotionFault: no pivot is above 1e-4: the arm is in a singular position.
-    """
-    m = [[*row, value] for row, value in zip(rows, right, strict=True)]
-    n = len(m)
-    for k in range(n):
-        lead = max(range(k, n), key=lambda i: abs(m[i][k]))
-        if abs(m[lead][k]) < 1e-4:
+        speeds = solve_linear(self.jacobian(), twist, _SMALLEST_PIVOT)
+        if speeds is None:
             raise MotionFault(_IN_SINGULARITY, "the arm is in a singular position")
-        m[k], m[lead] = m[lead], m[k]
-        pivot = m[k]
-        for i in range(k + 1, n):
-            factor = m[i][k] / pivot[k]
-            if factor:
-                row = m[i]
-                for j in range(k + 1, n + 1):
-                    row[j] -= factor * pivot[j]
-    x = [0.0] * n
-    for k in range(n - 1, -1, -1):
-        x[k] = (m[k][n] - sum(m[k][j] * x[j] for j in range(k + 1, n))) / m[k][k]
-    return x
+        return speeds
 
 
 def max_abs(values: Sequence[float]) -> float:

@@ -184,7 +184,7 @@ class ExpressionParser:
                 keys += f"{member!r}, "
                 continue
             self._take()
-            call = f"{member!r}, ({self._inside(self._arguments)})"
+            call = f"{member!r}, ({self._inside(self._items)})"
             if variable and member in CHANGING_METHODS:
                 self._changed(name)
                 call = f"(_r := (yield from _method(v_{name}, ({keys}), {call}))"
@@ -243,15 +243,15 @@ class ExpressionParser:
         if text == "run":
             name = self._name()
             self._take("(")
-            return f"_run({self._python_name(name, line)}, ({self._inside(self._arguments)}))"
+            return f"_run({self._python_name(name, line)}, ({self._inside(self._items)}))"
         if not self._next_is("("):
             return f"v_{text}"
         self._take()
         if text == "struct":
-            return f"_struct({{{self._inside(lambda: self._arguments(members=True))}}})"
+            return f"_struct({{{self._inside(lambda: self._items(named='{!r}: '))}}})"
         own = text in self._functions
         name = self._python_name(text, line)
-        arguments = self._inside(lambda: self._arguments(prefix="v_" if own else ""))
+        arguments = self._inside(lambda: self._items(named="v_{}=" if own else "{}="))
         return f"(yield from {name}({arguments}))" if own or text in self._blocking else f"{name}({arguments})"
 
     def _python_name(self, name: str, line: int) -> str:
@@ -280,10 +280,21 @@ class ExpressionParser:
         self._take(")")
         return f"({made})"
 
-    def _items(self, close: str) -> str:
-        """Parse elements up to a bracket, as Python text with a comma after each."""
+    def _items(self, close: str = ")", *, named: str = "") -> str:
+        """Parse elements or arguments up to a bracket, as Python text with a comma after each.
+
+        Args:
+            close: the bracket.
+            named: Python for the name of one that has one, such as ``{}=``; empty where none may have one.
+                ``{!r}: `` is that of a struct, whose members all need one.
+        """
         made, count = "", 0
         while not self._next_is(close):
+            if named and self._token.kind == "name" and self._tokens[self._at + 1].text == "=":
+                made += named.format(self._take().text)
+                self._take("=")
+            elif named.endswith(": "):
+                raise self._fail("a member of a struct needs a name: struct(x=1)")
             made += f"{self.expression()}, "
             count += 1
             if not self._next_is(close):
@@ -292,23 +303,4 @@ class ExpressionParser:
                 raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
         self._take(close)
         self._count = count
-        return made
-
-    def _arguments(self, *, prefix: str = "", members: bool = False) -> str:
-        """Parse arguments up to a bracket, those with a name too, as Python text with a comma after each."""
-        made, count = "", 0
-        while not self._next_is(")"):
-            if self._token.kind == "name" and self._tokens[self._at + 1].text == "=":
-                name = self._take().text
-                self._take()
-                made += f"{name!r}: " if members else f"{prefix}{name}="
-            elif members:
-                raise self._fail("a member of a struct needs a name: struct(x=1)")
-            made += f"{self.expression()}, "
-            count += 1
-            if not self._next_is(")"):
-                self._take(",")
-            if count > MAX_ITEMS:
-                raise self._fail(f"more than {MAX_ITEMS} elements or arguments")
-        self._take(")")
         return made

@@ -23,6 +23,7 @@ from .values import (
     numbers,
     pose_of,
     show,
+    solve_linear,
     values_of,
 )
 
@@ -51,22 +52,16 @@ class ValueFunctions:
         return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
 
     def inv(self, m: Any) -> Any:
-        """Return the inverse of a pose or of a matrix, by elimination with the largest pivots."""
+        """Return the inverse of a pose or of a matrix."""
         if isinstance(m, PoseValue):
             return self.pose_inv(m)
         if not is_matrix(m) or any(len(row) != len(m) for row in m):
             raise ScriptError(f"inv takes a pose or a square matrix, got {show(m)}")
-        rows = [[*map(float, row), *(float(i == j) for j in range(len(m)))] for i, row in enumerate(m)]
-        for i in range(len(rows)):
-            pivot = max(range(i, len(rows)), key=lambda n: abs(rows[n][i]))
-            if abs(rows[pivot][i]) < 1e-12:
-                raise ScriptError("inv: the matrix is singular")
-            rows[i], rows[pivot] = rows[pivot], rows[i]
-            rows[i] = [value / rows[i][i] for value in rows[i]]
-            for n, row in enumerate(rows):
-                if n != i:
-                    rows[n] = [a - row[i] * b for a, b in zip(row, rows[i], strict=True)]
-        return Array(Array(row[len(rows) :]) for row in rows)
+        units = [[float(i == j) for j in range(len(m))] for i in range(len(m))]
+        columns = [solve_linear(m, unit, 1e-12) for unit in units]
+        if None in columns:
+            raise ScriptError("inv: the matrix is singular")
+        return self.transpose(columns)
 
     def transpose(self, m: Any) -> Array:
         """Return a matrix, a list of rows, with its columns as rows."""

@@ -9,7 +9,7 @@ largest size: ``9 ^ 9 ^ 9``, or a text doubled a hundred times, would never end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from coneskin.geometry.pose import Pose, Vector
@@ -106,6 +106,28 @@ def interpolate(start: Pose, shift: Vector, turn: Vector, share: float) -> Pose:
     here = (p[0] + share * shift[0], p[1] + share * shift[1], p[2] + share * shift[2])
     turned = Pose(start.rotation) @ Pose.from_rotation_vector([share * angle for angle in turn])
     return Pose(turned.rotation, here)
+
+
+def solve_linear(rows: Sequence[Sequence[float]], right: Sequence[float], smallest: float) -> list[float] | None:
+    """Solve linear equations (Gauss, partial pivoting); return None where a pivot is below the smallest allowed one."""
+    m = [[*row, value] for row, value in zip(rows, right, strict=True)]
+    n = len(m)
+    for k in range(n):
+        lead = max(range(k, n), key=lambda i: abs(m[i][k]))
+        if abs(m[lead][k]) < smallest:
+            return None
+        m[k], m[lead] = m[lead], m[k]
+        pivot = m[k]
+        for i in range(k + 1, n):
+            factor = m[i][k] / pivot[k]
+            if factor:
+                row = m[i]
+                for j in range(k + 1, n + 1):
+                    row[j] -= factor * pivot[j]
+    x = [0.0] * n
+    for k in range(n - 1, -1, -1):
+        x[k] = (m[k][n] - sum(m[k][j] * x[j] for j in range(k + 1, n))) / m[k][k]
+    return x
 
 
 MAX_ITEMS = 200  #: of a list

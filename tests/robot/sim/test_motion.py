@@ -19,10 +19,10 @@ from coneskin.robot.sim.motion.arm import (
     Motion,
     MotionFault,
     SimulatedArm,
-    _solve_linear,
 )
 from coneskin.robot.sim.motion.motion import ServoJoints, SpeedJoints, SpeedTool, StopJoints, StopTool
 from coneskin.robot.sim.motion.path import JointLine, ToolLine
+from coneskin.robot.sim.urscript.values import solve_linear
 
 ARM = arm_model("ur10e")
 HOME = (0.1, -1.4, 1.5, -1.7, -1.4, 0.2)
@@ -200,9 +200,10 @@ def test_solve_solves_and_refuses_singular_equations() -> None:
     rows = [[draw.uniform(-1, 1) for _ in range(6)] for _ in range(6)]
     x = [draw.uniform(-1, 1) for _ in range(6)]
     right = [sum(a * b for a, b in zip(row, x, strict=True)) for row in rows]
-    assert _solve_linear(rows, right) == pytest.approx(x, abs=1e-11)  # condition about 1e2
+    assert solve_linear(rows, right, 1e-4) == pytest.approx(x, abs=1e-11)  # condition about 1e2
+    assert solve_linear([rows[0], *rows[:5]], right, 1e-4) is None
     with pytest.raises(MotionFault, match="singular"):
-        _solve_linear([rows[0], *rows[:5]], right)
+        SimulatedArm(ARM, (0.1, -1.4, 1.5, -1.7, 0.0, 0.2)).joint_speeds([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])  # wrist 2 at 0
 
 
 def test_joint_speeds_invert_the_jacobian() -> None:
