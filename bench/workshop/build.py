@@ -83,6 +83,7 @@ def _finished(text: str) -> dict[str, list[str]]:
 def seams() -> None:
     narrow = ElectrodePlan(margin=4e-3, electrode=3e-3, lead=3e-3, clearance=1e-3, hole=0.0)
     rows = {"default": DesignOptions(plan=ElectrodePlan()), "narrow electrodes": DesignOptions(plan=narrow)}
+    rows["flap of 10 mm"] = DesignOptions(plan=ElectrodePlan(), overlap=10e-3)
     rows["strip"] = DesignOptions(plan=ElectrodePlan(), cover_seam=True)
     rows["strip, narrow"] = DesignOptions(plan=narrow, cover_seam=True)
     for radius in (0.0375, 0.054, 0.075):

@@ -18,11 +18,11 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-from .electrode_layout import SheetLayout, SurfaceRectangle
+from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline, PathSegment, joint_bounds
 from .part_labels import PartLabel, ascii_text, part_labels, strip_label
-from .surface_shape import SurfaceShape, draw_hole, draw_shape
+from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
 from .touch_marks import CoverMarks
 
 
@@ -70,6 +70,7 @@ LINE_COLOURS: dict[str, tuple[int, int, int]] = {
     "label": (0, 0, 0),
 }
 _LONGEST_TITLE = 40  # letters; a longer line would make all text on a part small
+_WIDEST_FLAP = 0.25  # of the way around the narrow end; a wider flap covers the active area twice
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +162,7 @@ def cut_sheets(
     *,
     title: str = "sheet",
     kerf: float = 0.0,
+    overlap: float = 0.0,
     snap: float = 1e-5,
     face_up: FaceUp = "work",
 ) -> tuple[CutSheet, ...]:
@@ -172,15 +174,30 @@ def cut_sheets(
         place: of the sheet, whose side is that of the layout; None for a cone anywhere.
         title: written on every part.
         kerf: width of the cut [m]; borders grow and holes shrink by half of it.
+        overlap: width of a flap that closes the seam, on the upper substrate beyond phi = wrap [m].
         snap: a layer is cut as a rectangle where that moves no cut by more than this [m].
         face_up: "work" for the face on which the next part is glued, or one face for all parts.
 
     Raises:
-        GeometryError: kerf or snap is negative or not finite, or a detail is smaller than the kerf.
+        GeometryError: kerf, overlap or snap is negative or not finite, a detail is smaller than the kerf, or
+            the overlap runs into tabs or the other edge.
     """
-    for name, value in (("kerf", kerf), ("snap", snap)):
+    for name, value in (("kerf", kerf), ("overlap", overlap), ("snap", snap)):
         if not (math.isfinite(value) and value >= 0.0):
             raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:.4g} mm")
+    if overlap and layout.plan.wires == "edge1":
+        raise GeometryError("an overlap at edge1 would cover the tabs there: choose another side for the wires")
+    around = layout.sheet.wrap * min(layout.sheet.radius1, layout.sheet.radius2)
+    if overlap > _WIDEST_FLAP * around:
+        raise GeometryError(
+            f"an overlap must be at most {_WIDEST_FLAP:.0%} of the narrow end, {_WIDEST_FLAP * around * 1e3:.4g} mm, "
+            f"got {overlap * 1e3:.4g} mm"
+        )
+    if overlap and overlap >= edge_room(layout.sheet):
+        raise GeometryError(
+            f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, "
+            f"{edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
+        )
     plain = ascii_text(title)[:_LONGEST_TITLE]
     place = place or PlacedFrustum(layout.sheet)
     flat = layout
@@ -197,7 +214,9 @@ def cut_sheets(
             parts = tuple(_foil(layout, surface, which, face, plain) for which in pair)
         else:
             crosses = CoverMarks.of(flat, layout, surface, stack, place) if index == 4 else None
-            strokes = _marks(layout, surface, index, crosses) + _border(layout, surface, index)
+            strokes = _marks(layout, surface, index, crosses) + _border(
+                layout, surface, index, overlap if index == 4 else 0.0
+            )
             labels = part_labels(layout, surface, (*text, ascii_text(material)), crosses.clear if crosses else None)
             labels += tuple(crosses.labels()) if crosses else ()
             parts = (CutPart(name, strokes, labels),)
@@ -230,9 +249,15 @@ def nest_sheets(sheets: tuple[CutSheet, ...], gap: float = 10e-3) -> tuple[CutSh
     return tuple(placed)
 
 
-def _border(layout: SheetLayout, surface: Frustum, index: int) -> tuple[Stroke, ...]:
+def _border(layout: SheetLayout, surface: Frustum, index: int, overlap: float) -> tuple[Stroke, ...]:
     shape = {1: layout.lower, 3: layout.upper}.get(index, layout.rim)
     strokes = [Stroke("hole", draw_hole(surface, u, phi, layout.plan.hole)) for u, phi in layout.holes]
+    if overlap:
+        slant, wrap = surface.slant, surface.wrap
+        flap = ShapeTab(0.5 * slant, wrap, slant, overlap, "edge1")
+        seam = (ShapeCorner(0.0, wrap), ShapeCorner(slant, wrap))
+        shape = (ShapeCorner(0.0, 0.0), seam[0], flap, seam[1], ShapeCorner(slant, 0.0))
+        strokes.insert(0, Stroke("fold", draw_shape(surface, seam, closed=False)))
     return (*strokes, Stroke("cut", draw_shape(surface, shape)))
 
 

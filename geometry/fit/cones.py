@@ -19,6 +19,7 @@ from .fit_options import MOST_TOLERANCE, FitOptions, check_names
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .plan import FineStage, SheetPlan, best_plan
 from .surface_samples import SurfaceSamples
+from .touch_weights import TouchWeights
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
@@ -41,7 +42,7 @@ class LinkFit:
         candidates: number of axes tried.
         needed_tolerance: where nothing fits, a tolerance with which something does, tried [m]; infinite without one.
         bare_areas: what no sheet covers, by reason, the largest first; empty where no sheet fits.
-        weights: name of the map by which areas were weighed; empty where all count the same.
+        touch_weights: map by which areas were weighed; None where all count the same.
     """
 
     sheets: tuple[FittedSheet, ...]
@@ -54,7 +55,12 @@ class LinkFit:
     candidates: int
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
-    weights: str = ""
+    touch_weights: TouchWeights | None = None
+
+    @property
+    def weights(self) -> str:
+        """Name of the map by which areas were weighed; empty where all count the same."""
+        return "" if self.touch_weights is None else self.touch_weights.name
 
 
 def find_cones(
@@ -120,7 +126,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         reason="",
         candidates=len(link.axes),
         needed_tolerance=tolerance,
-        weights=link.weights.name if link.weights else "",
+        touch_weights=link.weights,
     )
     if plan is None:
         length, least = fit.link_length, options.min_length

@@ -177,6 +177,8 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
         ),
         (CYLINDER, "drawings.arcs=flattened; drawings.tolerance_mm=1e-9", "from 0.0001 to 1 mm, got 1e-09 mm"),
         (CYLINDER, "drawings.tolerance_mm=nan", "from 0.0001 to 1 mm, got nan mm"),
+        ([*CYLINDER, "--wrap-deg", "300"], "sheet.overlap_mm=5", "an overlap closes the seam of a full wrap"),
+        (CYLINDER, "sheet.overlap_mm=400", "an overlap must be at most 25% of the narrow end, 84.82 mm, got 400 mm"),
         (
             CYLINDER,
             "layers.thickness_mm=[100, 1, 1, 1, 1]",
@@ -191,6 +193,7 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
             "current_full_scale_ma must suit the normal drive current",
         ),
         (CYLINDER, "electronics.supply_v=3.3", "supply_v must be at most 95 % of adc_v"),
+        (CYLINDER, "sheet.overlap_mm=5; sheet.wires=edge1", "at the edge of C the tabs would lie on the sheet itself"),
         (CYLINDER, "search.touch_side=[1, 0, 0]", "search.touch_side is for a mesh"),
         (
             [*CYLINDER, "--wrap-deg", "180"],

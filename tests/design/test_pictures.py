@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.design.link_picture import _reasons, draw_link
+from coneskin.design.link_picture import _reasons, draw_link, draw_weights
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.fit.bare_areas import BareArea
+from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -58,3 +59,20 @@ def test_a_place_has_the_reason_of_most_samples_near_it() -> None:
     stray = np.array([[0.2, 0.0, 0.0], [0.21, 0.0, 0.0]])  # samples of the other reason amid these
     areas = [BareArea("a", 0.5, line[:50]), BareArea("b", 0.5, np.concatenate([line[50:], stray]))]
     assert _reasons(np.array([[0.2, 0.0, 0.0], [0.7, 0.0, 0.0]]), areas).tolist() == [0, 1]
+
+
+def test_what_counts_is_drawn_in_the_colours_of_its_weights() -> None:
+    """Half of a tube counts, half does not: each place has the colour of the nearest place of the map."""
+    from matplotlib import colormaps
+
+    figure = figures.Figure()
+    designs = design_sheets([PlacedFrustum(Frustum(RADIUS, RADIUS, LENGTH))], DesignOptions())
+    weights = TouchWeights(np.array([[0.05, 0.0, 0.1], [-0.05, 0.0, 0.1]]), np.array([4.0, 1.0]), "map.csv")
+    draw_weights(figure, tube(), designs, weights)
+    one, two, bar = figure.axes
+    assert "map.csv" in bar.get_xlabel()
+    for axes in (one, two):
+        full, quarter = shares(axes, *(COLOURS.to_hex(colormaps["viridis"](value)) for value in (1.0, 0.25)))
+        assert full + quarter > 0.9  # the rest are edges
+        assert min(full, quarter) > 0.1
+        assert len(axes.lines) == 4 * len(designs) + 1  # and the scale

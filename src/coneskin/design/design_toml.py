@@ -126,6 +126,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             wires: side where all four wires leave
             connector_mm: way from the rim to the wires' connector, shorter where there is no room
             seam_gap_mm: gap of the seam of a full wrap
+            overlap_mm: width of a flap of the upper substrate over the seam
             cover_seam: close the blind seam of each full wrap by a strip, a sensor on top
             sheet_gap_mm: smallest distance between neighboring sheets
             """,
@@ -133,6 +134,7 @@ DESIGN_TABLES: Mapping[str, tuple[str, tuple[Key, ...]]] = {
             Key("wires", str, choices=get_args(SheetSide), unset="where they find room"),
             Key("connector_mm", low=30.0, high=2000.0),
             Key("seam_gap_mm", low=0.0),
+            Key("overlap_mm", low=0.0),
             Key("cover_seam"),
             Key("sheet_gap_mm", low=0.0),
         ),

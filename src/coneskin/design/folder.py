@@ -276,7 +276,8 @@ def write_design(
             from .pictures import draw_pictures
 
             tolerance, areas = (0.0, ()) if fit is None else (fit.tolerance, fit.bare_areas)
-            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas)
+            weights = None if fit is None else fit.touch_weights
+            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas, weights)
         text = report_text(sheets, figures, title, (*notes, *larger, f"Frame of all poses: {frame}"), fit, drawn, beds)
         (draft / "report.md").write_text(text, encoding="utf-8")
         written = ["report.md", *(file for _, file in drawn)]

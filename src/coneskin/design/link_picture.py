@@ -20,7 +20,9 @@ from .sheets.sheet_design import SheetDesign
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
+    from coneskin.geometry.fit.touch_weights import TouchWeights
 
+    from .workshop.jig import Collar
     from .workshop.placement import DatumFace
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
@@ -246,3 +248,82 @@ def _border(design: SheetDesign) -> list[tuple[Any, Any]]:
     along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
     ends = [(np.full(len(around), u), around) for u in (0.0, side.slant)]
     return [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
+
+
+def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
+    """Draw the link from two sides, each place in the colour of its weight as a share of the largest.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        mesh: of the link.
+        designs: the sheets, of which the outlines are drawn.
+        weights: what an area counts.
+    """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    colours = colormaps["viridis"]
+    first = designs[0].place.link_frustum
+    panels = []
+    for number, way in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, 0.35)), 1):
+        axes = figure.add_subplot(1, 2, number)
+        view = _View(mesh, first.rotate(way))
+        view.draw(axes, lambda _, points: colours(weights.at(points))[:, :3])
+        view.draw_frame(axes)
+        for design in designs:
+            for u, phi in _border(design):
+                view.draw_line(axes, *design.outer_face(u, phi), color="#d1495b", lw=1.5)
+        panels.append(axes)
+    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), colours), ax=panels, location="bottom", shrink=0.6)
+    bar.set_label(f"what an area counts by {weights.name}, as a share of the largest; red: the sheets")
+
+
+_LIGHT_DIRECTION = np.array([0.35, -0.55, 0.76])
+_PART_DISTANCE = 0.25  # of the radius of a part: how far the parts are drawn from each other
+_PART_COLOURS = ("#6b9ec7", "#d99e66", "#8cb880", "#b894c2")
+
+
+def draw_jig(figure: Any, collars: Sequence[Collar]) -> None:
+    """Draw the collars of a sheet.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        collars: at least one.
+    """
+    grid = figure.subplots(1, len(collars), squeeze=False)
+    paints = _palette(_PART_COLOURS)
+    for axes, collar in zip(grid.flat, collars, strict=True):
+        turned = -1.0 if collar.end == 1 else 1.0  # as it stands, end 1 is upside down
+        middles = [0.5 * (part.start + part.end) for part in collar.parts]
+        ways = [np.array([math.cos(middle), turned * math.sin(middle), 0.0]) for middle in middles]
+        body, owner = _body(
+            part.surface.vertices[part.surface.faces] + 0.5 * _PART_DISTANCE * max(part.surface.extents[:2]) * way
+            for part, way in zip(collar.parts, ways, strict=True)
+        )
+        turn = _clear_azimuth(turned * angle for part in collar.parts for angle in (part.start, part.end))
+        high = math.radians(38.0)
+        view = _View(body, (math.cos(high) * math.cos(turn), math.cos(high) * math.sin(turn), math.sin(high)))
+        numbers = np.array([part.number - 1 for part in collar.parts])[owner] % len(paints)
+
+        def painted(hit: Any, _: Any, own: Any = paints[numbers]) -> Any:
+            return own[hit]
+
+        view.draw(axes, painted, _LIGHT_DIRECTION)
+        for part, way in zip(collar.parts, ways, strict=True):
+            out = view.flat(way) / np.linalg.norm(view.flat(way))
+            own = view.flat(body.vertices)
+            reach = float((own @ out).max()) + 0.06 * view.size  # beyond all of it
+            middle = own.mean(axis=0)
+            at = middle + (reach - float(middle @ out)) * out
+            name = f"part {part.number}" + (",\nbegins at edge 0" if part.number == 1 else "")
+            aside = "center" if abs(out[0]) < 0.3 else "left" if out[0] > 0.0 else "right"
+            axes.text(*at, name, fontsize=9, ha=aside, va="center", bbox=_LABEL_BOX)
+        axes.set_title(f"end {collar.end}", fontsize=10, loc="left")
+
+
+def _clear_azimuth(cuts: Iterable[float]) -> float:
+    """Return the azimuth of a view [rad] in which no cut plane is seen edge-on: the picture would look cropped."""
+    at = np.radians(np.arange(-175.0, 185.0, 5.0))
+    slant = np.abs(np.sin(at[:, None] - np.array(list(cuts)))).min(axis=1)
+    return float(at[int((slant + 0.05 * np.cos(at + math.radians(150.0))).argmax())])

@@ -1,4 +1,4 @@
-"""Pictures of the report, in one list: the link, the layouts, and the deviations from the mesh."""
+"""Pictures of the report, in one list: the link, the layouts, the jigs, and the deviations from the mesh."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ from coneskin.core.picture_file import degree_ticks, picture_style
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
-from .link_picture import draw_link
+from .link_picture import draw_jig, draw_link, draw_weights
 from .sheet_pictures import draw_layout, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
+    from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
 
 
@@ -32,6 +33,7 @@ def draw_pictures(
     tolerance: float,
     progress: Callable[[str], None],
     bare: Sequence[BareArea] = (),
+    weights: TouchWeights | None = None,
 ) -> list[tuple[str, str]]:
     """Draw the link with its sheets, and of each sheet its layout, its stack, and the map of deviations.
 
@@ -43,6 +45,7 @@ def draw_pictures(
         tolerance: of the fit [m].
         progress: called with the name of each step.
         bare: what no sheet covers, by reason; each has a colour of its own.
+        weights: what areas count; None where all count the same.
 
     Returns:
         caption and path in the folder of each picture.
@@ -74,6 +77,10 @@ def draw_pictures(
         + (" What is bare is tinted by its reason." if bare else "")
     )
     picture("link", (13, 7.5), caption, draw_link, designs, mesh, bare, tuple(faces.values()))
+    if weights is not None and mesh is not None:
+        progress("drawing what counts")
+        caption = f"What counts on the link, by {weights.name}, from two sides."
+        picture("weights", (10, 6), caption, draw_weights, mesh, designs, weights)
     for design, item in zip(designs, figures, strict=True):
         name, title = design.name.replace(" ", "-"), design.name.capitalize()
         progress(f"{design.name}: drawing the layout")
@@ -82,6 +89,10 @@ def draw_pictures(
         progress(f"{design.name}: drawing how it is built")
         caption = f"{title}: its seven parts in the order of assembly, each seen from outside."
         picture(f"{name}-stack", (9, 7), caption, draw_stack, design)
+        if item.collars:
+            progress(f"{design.name}: drawing the jig")
+            caption = f"{title}: parts of its jig as they are printed, a little apart."
+            picture(f"{name}-jig", (10, 4.5), caption, draw_jig, item.collars)
         if mesh is not None and not design.above:
             progress(f"{design.name}: measuring deviations")
             caption = (

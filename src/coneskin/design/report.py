@@ -205,12 +205,16 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         ],
     )
     yield from section_head("Accuracy forecast")
-    along, around = (1e3 * max(sizes) for sizes in zip(*((s.along, s.around) for s in design.forecasts()), strict=True))
     yield (
-        f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of {parts.supply_volts:g} V is at "
-        f"most {along:.4f} mm along and {around:.4f} mm around (eq. 25, 26). This is the limit of the A/D converter; "
-        "noise, the area of the contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
+        f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of "
+        f"{parts.supply_volts:g} V (eq. 25, 26). This is the limit of the A/D converter; noise, the area of the "
+        "contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
     )
+    yield ""
+    keys = {"u_mm": 1, "along_mm": 4, "around_mm": 4, "azimuth_deg": 4, "theta_deg": 5}
+    steps = [[f"{step[key]:.{digits}f}" for key, digits in keys.items()] for step in data["forecast"]]
+    columns = ("u of the active area [mm]", "along [mm]", "around [mm]", "azimuth [deg]", "theta [deg]")
+    yield from _table(columns, steps)
 
 
 def _sharpest(place: PlacedFrustum) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import LOOP, BuildFigures, measure_build
 from coneskin.design.workshop.build_guide import guide_lines
@@ -131,6 +131,19 @@ def test_a_sheet_is_placed_from_what_the_link_shows(azimuth: float) -> None:
     assert place.beyond == pytest.approx(0.05)
     assert place.around1 == pytest.approx(2 * math.pi * 0.05)
     assert place.seam == pytest.approx(pose.rotate((1.0, 0.0, 0.0)))
+    assert place.feature is not None
+    assert place.feature.azimuth == pytest.approx(azimuth)
+    assert place.feature.arc == pytest.approx(azimuth * 0.05)
+    assert place.feature.end == 2
+
+
+def test_a_round_link_has_nothing_to_measure_the_seam_from() -> None:
+    place = find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), bumped(None))
+    assert place.feature is None
+    assert place.before == pytest.approx(0.03)
+    collar = bumped(None)
+    wide = collar.vertices * np.where(collar.vertices[:, 2:] > 0.2, (1.5, 1.5, 1.0), (1.0, 1.0, 1.0))
+    assert find_placement(PlacedFrustum(Frustum(0.05, 0.05, 0.2)), Mesh(wide, collar.faces)).feature is None
 
 
 def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
@@ -175,6 +188,17 @@ def test_the_bends_of_an_oval_and_of_a_rounded_box_show_where_edge_0_is() -> Non
     turned = sharpest_bends(place.turned(middles[0] / radius))
     assert sorted(min(way, 2 * math.pi * radius - way) for _, way in turned)[0] == pytest.approx(0.0, abs=1e-5)
     assert sharpest_bends(PlacedFrustum(Frustum(radius, radius, 0.2))) == []
+
+
+def test_a_sheet_beyond_whose_edge_something_stands_out_is_placed_by_a_straight_line() -> None:
+    """A tape measure does not follow the link there: the distance of the two points, by their coordinates."""
+    (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions())
+    text = guide(design, measure_build(design, 0, "mesh", bumped(4.5)))
+    exact = math.dist((0.05, 0.0, 0.2), (0.08 * math.cos(4.5), 0.08 * math.sin(4.5), 0.24))
+    assert f"{1e3 * exact:.1f} mm straight through the air, from edge 0 at end 2 (257.8 deg)" in text
+    assert "around end 2, in the direction of the wrap (257.8" not in text
+    assert "| +y | 78.5 mm (90.0 deg) |" in text
+    assert "| -y |" not in text, "no place of the sheet faces there"
 
 
 def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:
@@ -254,6 +278,19 @@ def test_the_bill_has_what_the_steps_use_up() -> None:
     assert "hook-and-loop tape" in text
     assert "isopropanol" in text
     assert any("isopropanol" in name for name in items)
+
+
+def test_what_no_ruler_reaches_is_not_told() -> None:
+    """A part that stands out 0.5 m away is no place to measure from; at 0.13 m it is (above)."""
+    (design,) = design_sheets(
+        [PlacedFrustum(Frustum(0.05, 0.05, 0.2, math.radians(200)))], DesignOptions(jig=JigPlan("none"))
+    )
+    mesh = bumped(4.5)
+    for reach, told in ((0.1, True), (0.5, False)):
+        far = np.array(mesh.vertices)
+        far[-1] = reach * math.cos(4.5), reach * math.sin(4.5), 0.24
+        text = guide(design, measure_build(design, 0, "mesh", Mesh(far, mesh.faces)))
+        assert ("through the air" in text) == told
 
 
 def test_an_end_at_the_links_own_end_is_told_for_a_tilted_sheet_too() -> None:

@@ -103,7 +103,8 @@ def test_labels_lie_inside_clear_of_every_line_and_of_each_other(name, side):
 def test_no_two_strokes_run_on_each_other(name, side):
     """A cutter would burn twice. Marks may end on a border, but not run along it."""
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))
-    for sheet in cut_sheets(layout, PAPER_STACK):
+    overlap = 0.0 if side == "edge1" or "disc" in name else 0.008
+    for sheet in cut_sheets(layout, PAPER_STACK, overlap=overlap):
         strokes = [stroke.outline for part in sheet.parts for stroke in part.strokes]
         for one, two in combinations(strokes, 2):
             a, b = dense(one), dense(two)
@@ -115,6 +116,16 @@ def test_no_two_strokes_run_on_each_other(name, side):
                 touching = distances(points[::4], others) < 0.15e-3
                 # a mark that ends on this line touches it within a millimetre and a half on either side
                 assert touching.sum() <= 4
+
+
+def test_flap_closes_the_seam_on_the_upper_substrate_only():
+    layout = lay_out_sheet(SHEETS["widening"])
+    plain, with_flap = (cut_sheets(layout, PAPER_STACK, overlap=width) for width in (0.0, 0.010))
+    for a, b in zip(plain[:-1], with_flap[:-1], strict=True):
+        assert a == b
+    grown = with_flap[-1].parts[0].area - plain[-1].parts[0].area
+    assert grown == pytest.approx(0.010 * layout.sheet.slant, rel=1e-9)
+    assert [stroke.kind for stroke in with_flap[-1].parts[0].strokes].count("fold") == 1
 
 
 def test_materials_count_what_is_cut():
@@ -146,5 +157,11 @@ def test_mistakes_are_said():
     layout = lay_out_sheet(SHEETS["widening"])
     with pytest.raises(GeometryError, match=r"kerf must be finite and not negative, got -0\.1 mm"):
         cut_sheets(layout, PAPER_STACK, kerf=-1e-4)
+    with pytest.raises(GeometryError, match="overlap must be finite and not negative, got nan mm"):
+        cut_sheets(layout, PAPER_STACK, overlap=float("nan"))
     with pytest.raises(GeometryError, match="is larger than a detail"):
         cut_sheets(layout, PAPER_STACK, kerf=3e-3)
+    with pytest.raises(GeometryError, match="an overlap of 8 mm runs into the other edge of the flat pattern, 0 mm"):
+        cut_sheets(lay_out_sheet(SHEETS["disc"]), PAPER_STACK, overlap=8e-3)
+    with pytest.raises(GeometryError, match="an overlap at edge1 would cover the tabs"):
+        cut_sheets(lay_out_sheet(SHEETS["widening"], ElectrodePlan(wires="edge1")), PAPER_STACK, overlap=5e-3)

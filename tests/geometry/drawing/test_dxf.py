@@ -116,13 +116,13 @@ def test_corners_come_to_lie_on_the_ends_of_the_sheet(name):
 
 
 def test_file_says_r2010_and_millimetres_and_names_its_layers():
-    text = to_dxf(cut_sheets(lay_out_sheet(SHEETS["widening"]), PAPER_STACK))
+    text = to_dxf(cut_sheets(lay_out_sheet(SHEETS["widening"]), PAPER_STACK, overlap=0.01))
     assert dxf_header(text, "$ACADVER") == "AC1024"  # R2010
     assert dxf_header(text, "$INSUNITS") == "4"  # millimetres
     assert dxf_header(text, "$MEASUREMENT") == "1"
     layers = dxf_layers(text)
     for kind, colour in (("CUT", 1), ("HOLE", 6), ("SCORE", 5), ("FOLD", 3), ("LABEL", 250)):
-        assert layers[f"{'6-upper-electrodes' if kind == 'FOLD' else '7-upper-substrate'}_{kind}"] == colour
+        assert layers[f"7-upper-substrate_{kind}"] == colour
     assert 7 not in {layers[name] for name in layers if name[0].isdigit() and name != "0"}  # white on paper
     cuts = [s for s in read_dxf(text) if s.layer.endswith(("_CUT", "_HOLE"))]
     assert len(cuts) == 9 + 5 * 3

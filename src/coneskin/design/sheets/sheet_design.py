@@ -103,6 +103,7 @@ class DesignOptions:
             for the shape of each sheet (``match_sheet_materials``).
         lower_sheet_ohms: the same of the lower conductive layer.
         seam_gap: gap of the seam of a full wrap, at the narrow end of the innermost face.
+        overlap: width of a flap on the upper substrate that closes the seam.
         cover_seam: True for a strip over the seam of each full wrap, a sensor of its own that closes it.
         sheet_gap: smallest distance between neighboring sheets.
         kerf: width of the cut.
@@ -121,6 +122,7 @@ class DesignOptions:
     upper_sheet_ohms: float | None = None
     lower_sheet_ohms: float | None = None
     seam_gap: float = 0.0
+    overlap: float = 0.0
     cover_seam: bool = False
     sheet_gap: float = 1e-3
     kerf: float = 0.0
@@ -312,6 +314,7 @@ def _sheet_design(
         placed.place,
         title=f"{options.link}: {name}" if options.link else name,
         kerf=options.kerf,
+        overlap=options.overlap,
         snap=options.snap,
         face_up=options.face_up,
     )
@@ -352,6 +355,9 @@ def _check_wrap(link: PlacedFrustum, options: DesignOptions) -> None:
                     f"possible: make it thinner than {layer.thickness * 1e3:g} mm, or choose another "
                     "layers.assembly"
                 )
+    if options.overlap and link.frustum.wrap < math.tau - 1e-9:
+        wrap = math.degrees(link.frustum.wrap)
+        raise GeometryError(f"an overlap closes the seam of a full wrap, this one is of {wrap:.4g} deg: leave it out")
 
 
 def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
@@ -373,7 +379,7 @@ def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
     side = link.frustum
     narrow = min(side.radius1, side.radius2)
     if not (math.isfinite(gap) and gap >= 0.0):
-        raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm")
+        raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm; for a flap use overlap")
     if gap == 0.0 or side.wrap < math.tau - 1e-9:
         return link
     if gap >= math.tau * narrow:
@@ -421,7 +427,7 @@ def cover_seams(designs: Sequence[SheetDesign], mesh: Mesh | None = None) -> tup
     for design in designs:
         if design.options.cover_seam and design.place.frustum.wrap > _SEAM_TURN_SHARE * math.tau:
             plan = design.layout.plan
-            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, cover_seam=False)
+            options = replace(design.options, plan=plan, wires=plan.wires, seam_gap=0.0, overlap=0.0, cover_seam=False)
             place, offset = _strip_place(design)
             bodies: list[Body] = [SheetBody(d.place, d.options.stack.thickness) for d in designs if d is not design]
             bodies += [body for d in (*designs, *strips) for body in (d.apron.body(), d.way.body())]

@@ -54,6 +54,16 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
             layer.name: _round(1e3 * stack.ignored_gap(design.place, i)) for i, layer in enumerate(stack.layers)
         },
         "electronics": _electronics(design),
+        "forecast": [
+            {
+                "u_mm": _round(1e3 * step.u),
+                "along_mm": _round(1e3 * step.along, 6),
+                "around_mm": _round(1e3 * step.around, 6),
+                "azimuth_deg": _round(math.degrees(step.azimuth), 6),
+                "theta_deg": _round(math.degrees(step.theta), 6),
+            }
+            for step in design.forecasts()
+        ],
     }
     if design.above:
         data["above"] = design.above

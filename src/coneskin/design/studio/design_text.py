@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,6 +14,7 @@ import numpy as np
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
+from coneskin.geometry.drawing.part_labels import PartLabel
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.sector import unroll
 
@@ -132,6 +134,7 @@ def electrode_marks(design: SheetDesign) -> list[_ElectrodeMark]:
 
 _PANEL_WIDTH = 340.0  # pixels; of the panel's width, for a drawing
 _MAX_DRAWING_HEIGHT = 230.0  # pixels of a drawing
+_MIN_LETTER_HEIGHT = 9.0  # pixels of capitals; what is cut has smaller ones, to fit on its part
 _STROKE_CLASSES = {"cut": "cut", "hole": "hole", "score": "mark", "fold": "fold"}
 
 
@@ -189,7 +192,9 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
 
 def flat_drawing(sheet: CutSheet) -> str:
     """Return a layer as it is cut, to fit the width of the panel, with letters and lines that can be seen there."""
-    drawn = to_svg((sheet,), sheet.name)
+    left, low, right, high = sheet.bounds
+    pixel = max((right - left) / _PANEL_WIDTH, (high - low) / _MAX_DRAWING_HEIGHT)  # m
+    drawn = to_svg((_with_readable_labels(sheet, _MIN_LETTER_HEIGHT * pixel),), sheet.name)
     drawn = re.sub(r"^<\?xml[^>]*\?>\s*", "", drawn)
     drawn = re.sub(
         r'width="[^"]*mm" height="[^"]*mm"',
@@ -205,6 +210,26 @@ def flat_drawing(sheet: CutSheet) -> str:
         f'<div style="font-size:12px;padding:2px 6px">{escape(sheet.name)}, {escape(sheet.material)}, '
         f"{escape(sheet.face)} face up<br>{chips}</div>{drawn}</div>"
     )
+
+
+def _with_readable_labels(sheet: CutSheet, height: float) -> CutSheet:
+    """Return a sheet for the eye: labels at least so high [m], lines of one block as far apart as they then need."""
+    parts = []
+    for part in sheet.parts:
+        blocks: dict[tuple[float, float, float], list[PartLabel]] = {}
+        for label in part.labels:
+            along = label.x * math.cos(label.angle) + label.y * math.sin(label.angle)
+            blocks.setdefault((round(label.angle, 6), round(label.height, 6), round(along, 6)), []).append(label)
+        labels: list[PartLabel] = []
+        for block in blocks.values():
+            grown = max(1.0, height / block[0].height)
+            x0, y0 = (sum(values) / len(block) for values in zip(*((one.x, one.y) for one in block), strict=True))
+            labels += [
+                replace(one, x=x0 + grown * (one.x - x0), y=y0 + grown * (one.y - y0), height=grown * one.height)
+                for one in block
+            ]
+        parts.append(replace(part, labels=tuple(labels)))
+    return replace(sheet, parts=tuple(parts))
 
 
 def warning_list(lines: Sequence[str]) -> str:

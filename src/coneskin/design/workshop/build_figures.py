@@ -157,7 +157,7 @@ class BuildFigures:
 
     def as_data(self, design: SheetDesign) -> dict[str, Any]:
         """Return the figures and the coordinates of holes and electrodes as plain data, in mm and degrees."""
-        way, placement = design.way, self.placement
+        way, placement, feature = design.way, self.placement, self.placement.feature
         layout, surfaces = design.layout, {"CD": design.cuts[1].surface, "AB": design.cuts[5].surface}
         return {
             "holes": [_point(u, phi) for u, phi in layout.holes],
@@ -186,6 +186,20 @@ class BuildFigures:
             "squares": {pair.pair: round(pair.squares, 5) for pair in self.pairs},
             "untouched_frame": self.frame,
             "placement": {
+                "around_end1_mm": _mm(placement.around1),
+                "around_end2_mm": _mm(placement.around2),
+                "before_end1_mm": None if placement.before is None else _mm(placement.before),
+                "beyond_end2_mm": None if placement.beyond is None else _mm(placement.beyond),
+                "seam_direction": [round(value, 5) + 0.0 for value in placement.seam],
+                "feature": None
+                if feature is None
+                else {
+                    "radius_mm": _mm(feature.radius),
+                    "azimuth_deg": round(math.degrees(feature.azimuth), 3),
+                    "from_end1_mm": _mm(feature.height),
+                    "arc_mm": _mm(feature.arc),
+                    "at_end": feature.end,
+                },
                 "faces": [
                     {
                         "name": face.name,

@@ -187,6 +187,8 @@ def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "the margins of part 7, as above; on the isolation and above the active area only smooth by hand, for the "
         "roller would press the two conductive sheets together."
     )
+    if options.overlap:
+        yield f"Fold the flap of part 7, {in_mm(options.overlap)} wide, over edge 0 and fix it with {TAPE}."
     if design.layout.holes:
         yield "Cut the pins flush. Use no metal: it would short-circuit the two conductive sheets."
     if figures.collars:

@@ -185,10 +185,31 @@ def _area(face: DatumFace) -> float:
     return face.size[0] * face.size[1]
 
 
+_STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
+_OUTERMOST_DEPTH = 1e-3  # m; points so near to the outermost one are its neighbours
 _ALIKE_BENDS = 0.01  # bends of two strips that differ by less are alike: they are fitted
 _ALIKE_STRIPS = 0.05  # a strip that is bent less than another by less belongs to it
 _MIN_AXIS_SLOPE = 0.35  # mm of a height for each mm along the axis: it then fixes the place along the axis
 _SQUARE_SINE = math.sin(math.radians(1.0))  # an axis is held square, or along a face, by a try square
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFeature:
+    """The point of a link that is furthest from the axis of a sheet: a flange, an elbow, a cover.
+
+    Attributes:
+        radius: distance from the axis [m].
+        azimuth: from the seam [rad], in [0, 2 pi).
+        height: along the axis from end 1 of the sheet, positive towards end 2 [m].
+        arc: from the seam to its azimuth, around the sheet at the end nearer to it [m].
+        end: that end, 1 or 2.
+    """
+
+    radius: float
+    azimuth: float
+    height: float
+    arc: float
+    end: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +223,7 @@ class SheetPlacement:
             there is no mesh.
         beyond: from end 2 to the outermost point of the link on its side [m]; None where there is no mesh.
         seam: direction in which edge 0 faces, in the frame of the link.
+        feature: what stands out, from which the seam is measured; None where nothing does.
         faces: flat faces of the link from which places are measured.
         heights: distances from these faces; empty where there is none.
         tilted: True where the axis is square to no face and along none, and the heights fix the place along it: what a
@@ -213,6 +235,7 @@ class SheetPlacement:
     before: float | None
     beyond: float | None
     seam: tuple[float, float, float]
+    feature: LinkFeature | None
     faces: tuple[DatumFace, ...] = ()
     heights: tuple[_DatumHeight, ...] = ()
     tilted: bool = False
@@ -235,8 +258,22 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
     around = side.wrap * side.radius1, side.wrap * side.radius2
     seam, axis = pose.rotate((1.0, 0.0, 0.0)), pose.rotate((0.0, 0.0, 1.0))
     if mesh is None:
-        return SheetPlacement(*around, None, None, seam)
-    z = pose.inverse().apply_all(mesh.vertices)[:, 2]
+        return SheetPlacement(*around, None, None, seam, None)
+    x, y, z = pose.inverse().apply_all(mesh.vertices).T
+    radius = np.sqrt(x * x + y * y)
+    feature = None
+    furthest = int(radius.argmax())
+    if not place.bends and radius[furthest] > max(side.radius1, side.radius2) + _STANDS_OUT:
+        near = radius > radius[furthest] - _OUTERMOST_DEPTH
+        first = math.atan2(y[furthest], x[furthest])
+        turns = (np.arctan2(y[near], x[near]) - first + math.pi) % (2.0 * math.pi) - math.pi
+        # a collar stands out all around: it has no azimuth
+        if float(np.ptp(turns)) < 0.5 * math.pi:
+            azimuth = (first + 0.5 * float(turns.min() + turns.max())) % (2.0 * math.pi)
+            height = float(np.median(z[near]))
+            end = 1 if height < 0.5 * side.height else 2
+            arc = azimuth * (side.radius1 if end == 1 else side.radius2)
+            feature = LinkFeature(float(radius[furthest]), azimuth, height, arc, end)
     usable = _measured_faces(place, faces)
     along = [abs(math.fsum(a * b for a, b in zip(face.normal, axis, strict=True))) for face in usable]
     held = any(cosine < _SQUARE_SINE or cosine > math.sqrt(1.0 - _SQUARE_SINE**2) for cosine in along)
@@ -245,6 +282,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
         -float(z.min()),
         float(z.max()) - side.height,
         seam,
+        feature,
         usable,
         _datum_heights(place, usable) if usable else (),
         max(along, default=0.0) >= _MIN_AXIS_SLOPE and not held,

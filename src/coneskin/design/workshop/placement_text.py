@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from coneskin.design.sheets.sheet_design import SheetDesign
 
 from .build_figures import BuildFigures, in_mm, table_head
-from .placement import SheetPlacement, sharpest_bends
+from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 _AT_END = 3e-3  # m; a sheet so near to the end of a link is placed by eye
+_MAX_RULER = 0.2  # m; a ruler through the air
 
 
 def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
@@ -42,11 +45,11 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     word = "once around the link" if side.wrap > 6.28 else "edge 0, around the link, to the other edge"
     yield f"| {word} | at end 1 | {in_mm(place.around1)} by tape measure |"
     yield f"| {word} | at end 2 | {in_mm(place.around2)} by tape measure |"
+    if place.feature is not None and not place.around_fixed and (way := _feature_way(design, place.feature)):
+        yield f"| line of edge 0 | {way} |"
     yield ""
     yield from _height_lines(design, place)
-    x, y, z = (f"{value:z.3f}" for value in place.seam)
-    yield f"Edge 0 faces the direction ({x}, {y}, {z}) of the frame above."
-    yield ""
+    yield from _facing(design, place)
     if place.before is None:
         yield (
             "There is no mesh, so the link shows no datum: choose where end 1 and edge 0 lie, draw them, and write "
@@ -63,9 +66,9 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
         yield "Edge 0 is where the bold distances say."
     elif design.place.bends:
         yield from _bend_lines(design)
-    else:
+    elif place.feature is None:
         yield (
-            "The link has no flat face and no bend that shows edge 0. Any one will do: choose it, and if it "
+            "Nothing stands out from the link by which edge 0 could be found. Any one will do: choose it, and if it "
             "does not face as above, design again with `--seam X Y Z`, the direction in which yours faces. To find a "
             "direction on the link, hold the picture of the link beside it: it shows the axes of the frame."
         )
@@ -73,6 +76,25 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
         "`coneskin commission` shows whether it is right: a sheet that is turned by 10 mm or more reads its marks at "
         "other places than it has them."
     )
+
+
+def _feature_way(design: SheetDesign, part: LinkFeature) -> str:
+    """Return the way from edge 0 to what stands out, around the sheet, or straight where that is not on the sheet.
+
+    It is empty where that would be too far for a ruler.
+    """
+    side = design.place.frustum
+    what = f"middle of the part of the link that stands out furthest, {in_mm(part.radius)} from the axis"
+    if part.azimuth <= side.wrap:
+        way = f"{in_mm(part.arc)} around end {part.end}, in the direction of the wrap"
+    else:  # no tape follows the link there
+        radius, height = (side.radius1, 0.0) if part.end == 1 else (side.radius2, side.height)
+        x, y = part.radius * math.cos(part.azimuth), part.radius * math.sin(part.azimuth)
+        straight = math.dist((x, y, part.height), (radius, 0.0, height))
+        if straight > _MAX_RULER:
+            return ""
+        way = f"{in_mm(straight)} straight through the air, from edge 0 at end {part.end}"
+    return f"{what} | {way} ({math.degrees(part.azimuth):.1f} deg)"
 
 
 def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
@@ -106,6 +128,22 @@ def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
     yield ""
 
 
+def _facing(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
+    """Yield where edge 0 faces, and which places of the sheet face along the axes of the link's frame."""
+    x, y, z = (f"{value:z.3f}" for value in place.seam)
+    yield f"Edge 0 faces the direction ({x}, {y}, {z}) of the frame above."
+    yield ""
+    facing = list(_axes_around(design))
+    if not facing:
+        return
+    yield from table_head(
+        "place that faces along an axis of the frame", "from edge 0, around end 1, in the direction of the wrap"
+    )
+    for name, phi in facing:
+        yield f"| {name} | {in_mm(phi * design.place.frustum.radius1)} ({math.degrees(phi):.1f} deg) |"
+    yield ""
+
+
 def _bend_lines(design: SheetDesign) -> Iterator[str]:
     """Yield where a link that is not round is bent most, by which edge 0 is found."""
     yield (
@@ -119,6 +157,27 @@ def _bend_lines(design: SheetDesign) -> Iterator[str]:
     for number, (radius, arc) in enumerate(sharpest_bends(design.place), 1):
         yield f"| {number} | {in_mm(radius)} | {in_mm(arc)} |"
     yield ""
+
+
+def _axes_around(design: SheetDesign) -> Iterator[tuple[str, float]]:
+    """Yield the axes of the link's frame along which a place of the sheet faces, with its azimuth [rad]."""
+    wrap, back = design.place.frustum.wrap, design.place.link_frustum.inverse()
+    phi = np.linspace(0.0, wrap, 3601)
+    _, normals = design.place.place(0.0, phi)
+    for name, axis in (("x", (1.0, 0.0, 0.0)), ("y", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0))):
+        across, up, _ = back.rotate(axis)
+        if math.hypot(across, up) < 0.5:
+            continue
+        for sign in (1.0, -1.0):
+            if design.place.bends:
+                facing = sign * (normals @ np.array(axis))
+                found = float(np.median(phi[facing > facing.max() - 1e-9])) if facing.max() > 0.9 else None
+            else:
+                turn = math.atan2(sign * up, sign * across) % (2.0 * math.pi)
+                turn = 0.0 if turn > 2.0 * math.pi - 1e-4 else turn  # edge 0 itself, but for rounding
+                found = turn if turn <= wrap else None
+            if found is not None:
+                yield f"{'+' if sign > 0.0 else '-'}{name}", found
 
 
 def _strip_placement(design: SheetDesign) -> Iterator[str]:
