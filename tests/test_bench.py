@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -65,3 +66,15 @@ def test_a_result_says_where_it_comes_from_and_what_it_does_not_show() -> None:
 def test_each_bench_can_be_imported_and_has_a_main() -> None:
     done = subprocess.run([sys.executable, "-c", IMPORT_ALL], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.promise("P38")
+@pytest.mark.long
+def test_an_arm_that_gives_way_to_a_firm_push_meets_a_wall_behind_its_wrist_slowly() -> None:
+    """28 N at 18 mm/s: a hard body takes 3.6 N more each ms, and the joints show it after some."""
+    pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
+    words = [sys.executable, "-m", "bench", "bare-sides", "--case", "2", "--way", "comply"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    (force,) = re.findall(r"forces=\([\d.]+, ([\d.]+)\)", done.stdout)
+    assert "something resists it" in done.stdout
+    assert 5.0 < float(force) < 20.0

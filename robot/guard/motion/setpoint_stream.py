@@ -88,6 +88,7 @@ _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will 
 
 #: m/s of a surface that no skin covers, outward, where the scene allows that: the joints feel what it meets in 15 ms
 MAX_BARE_SPEED = 0.02
+_MAX_PUSHED_SPEED = 0.008  # m/s; the same where a push moves the arm: it drives it on into what is met
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
 
@@ -298,10 +299,12 @@ class MotionStream:
         ahead = [q + _BARE_STEP * v for q, v in zip(state.q, step.qd, strict=True)]
         if not self._allowed:
             return _bare_way(bare, self._start, ahead) or step
-        speed = bare.way(state.q, ahead)[0] / _BARE_STEP
-        if speed <= MAX_BARE_SPEED:
+        speed, most = bare.way(state.q, ahead)[0] / _BARE_STEP, MAX_BARE_SPEED
+        if self.how == "push":
+            most = _MAX_PUSHED_SPEED
+        if speed <= most:
             return step
-        share = MAX_BARE_SPEED / speed
+        share = most / speed
         a, b, c, d, e, f = (share * v for v in step.qd)
         by = (*step.clipped_by, "bare side")
         return replace(step, qd=(a, b, c, d, e, f), away=share * step.away, clipped_by=by)
