@@ -10,7 +10,7 @@ from pathlib import Path
 from coneskin.core.errors import GeometryError
 from coneskin.design.folder import write_design
 from coneskin.design.link_design import LinkMesh, find_link_sheets, with_seams
-from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_assembly, design_sheets
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -193,15 +193,19 @@ class Workbench:
         """
         if not self.designs:
             raise GeometryError(self.refusal or self.fit.reason)
+        # the cables of the page go on as the sheets do; those of the folder lie on the link
+        designs, left_out = design_assembly(self.adjusted_fit, self.options, self.link.mesh)
+        if not designs:
+            raise GeometryError("; ".join(left_out))
         data = write_design(
             folder,
-            self.designs,
-            fit=self.adjusted_fit,
+            designs,
+            fit=replace(self.adjusted_fit, sheets=tuple(design.fit for design in designs if design.fit is not None)),
             mesh=self.link.mesh,
             title=self.link.name,
             source=self.link.mesh.source,
             frame=self.link.frame,
-            notes=self.link.notes,
+            notes=(*self.link.notes, *left_out),
             pictures=pictures,
             replace=overwrite,
         )
