@@ -47,9 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show a scene or runs."""
+    from coneskin.runs.run_files import find_recordings
+
     scenes = [path for path in args.what if path.suffix == ".toml"]
     if scenes and len(args.what) > 1:
         raise SceneError(["a scene is shown alone: name one scene, or runs"], str(scenes[0]))
+    if not scenes:
+        named = [[path] if (path / "run.rec").is_file() else find_recordings([path]) for path in args.what]
+        args.what = [path for paths in named for path in paths]
     if args.html is not None:
         if scenes:
             raise SceneError(["--html writes recordings: name runs, such as runs/*"], str(scenes[0]))

@@ -7,6 +7,7 @@ from functools import cache
 import pytest
 
 from coneskin.commissioning.examination.examination import Doctor, set_sensor_keys
+from coneskin.commissioning.examination.skin_examination import SensorStatistics, _timing
 from coneskin.commissioning.examination.wires import touch_places
 from coneskin.core.finding import Finding
 from coneskin.scene.reader import parse_scene
@@ -151,6 +152,19 @@ def test_what_an_untouched_skin_has_wrong_is_named(skin: dict[str, object], item
     assert found.verdict == verdict
     assert said in found.value
     assert found.remedy
+
+
+def test_a_clock_that_a_busy_computer_cannot_judge_is_no_fault_of_the_firmware() -> None:
+    def clock(late: float) -> Finding:
+        seen = SensorStatistics()
+        for time, frame in VirtualSkin(parse_scene(TEXT).sensors[0].sensor, duration=3.0, model="ladder").frames():
+            seen.add(time + late * (time > 1.5), frame)
+        (found,) = (one for one in _timing("skin", seen, 0.0, 0.05) if one.item == "skin, clock")
+        return found
+
+    assert clock(0.0).verdict == "ok"
+    assert clock(0.08).verdict == "warning"
+    assert "held frames up for 8" in clock(0.08).remedy
 
 
 def test_a_low_rate_for_which_the_scene_is_made_is_a_warning() -> None:

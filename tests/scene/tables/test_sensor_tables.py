@@ -71,13 +71,13 @@ def test_a_height_in_metres_is_said_to_be_one() -> None:
 
 
 def test_a_file_gives_keys_and_the_table_wins(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text("radius1_mm = 1\nheight_mm = 2\n")
+    (tmp_path / "a.toml").write_text("radius1_mm = 1\nlead_ohm = 2\n")
     problems: list[str] = []
-    assert merge_sensor_file({"file": "a.toml", "height_mm": 3}, "s", tmp_path, problems) == {
+    assert merge_sensor_file({"file": "a.toml", "lead_ohm": 3}, "s", tmp_path, problems) == {
         "radius1_mm": 1,
-        "height_mm": 3,
+        "lead_ohm": 3,
     }
-    assert merge_sensor_file({"height_mm": 3}, "s", tmp_path, problems) == {"height_mm": 3}
+    assert merge_sensor_file({"lead_ohm": 3}, "s", tmp_path, problems) == {"lead_ohm": 3}
     assert problems == []
     assert merge_sensor_file({"file": "b.toml"}, "s", tmp_path, problems) == {}
     assert merge_sensor_file({"file": ""}, "s", tmp_path, problems) == {}
@@ -107,3 +107,13 @@ def test_the_files_of_a_design_are_sensors_of_a_scene(tmp_path: Path, capsys: py
             x, y, z = placed.point(u, 1.0)
             bare = 0.04 + 0.03 * (z / 0.15 if z < 0.15 else 2.0 - z / 0.15)
             assert 0.0 <= math.hypot(x, y) - bare < 0.004
+
+
+def test_a_sheet_that_was_cut_is_given_no_other_cone(tmp_path: Path) -> None:
+    (tmp_path / "sensor.toml").write_text("radius1_mm = 41\nradius2_mm = 41\nheight_mm = 200\n")
+    problems: list[str] = []
+    same = {"file": "sensor.toml", "radius1_mm": 41}
+    assert merge_sensor_file(same, "sensor 1", tmp_path, problems)["height_mm"] == 200
+    assert problems == []
+    merge_sensor_file({**same, "radius2_mm": 20}, "sensor 1", tmp_path, problems)
+    assert problems == ["sensor 1: radius2_mm = 20 cannot stand beside file, whose sheet was cut for 41: leave it out"]

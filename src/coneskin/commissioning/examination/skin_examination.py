@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import statistics
 from typing import TYPE_CHECKING, Any
@@ -164,9 +165,15 @@ def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> 
     value = f"{100.0 * numbers.missing:.1f} % of the frames"
     found.append(judged(f"{name}, lost", numbers.missing <= _MAX_LOST, value, "at most 2 %", remedy))
     ratio = numbers.clock_ratio
+    error = abs(ratio - 1.0) - max(_CLOCK_ERROR, drift)
+    held = max(later - earlier for earlier, later in itertools.pairwise(seen.times))
     remedy = "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
+    verdict = "ok" if error <= 0.0 else "bad"
+    if 0.0 < error <= 2.0 * held / (seen.times[-1] - seen.times[0]):  # a step turns a line by 1.5 times its share
+        verdict = "warning"
+        remedy = f"this computer held frames up for {1e3 * held:.0f} ms: end what else it does, and look again"
     value, rule = f"{ratio:.3f} device seconds in a second", "1 +- 0.01, as far as a few seconds show it"
-    found.append(judged(f"{name}, clock", abs(ratio - 1.0) <= max(_CLOCK_ERROR, drift), value, rule, remedy))
+    found.append(judged(f"{name}, clock", verdict, value, rule, remedy))
     return found
 
 

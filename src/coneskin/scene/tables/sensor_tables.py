@@ -46,7 +46,14 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
     if folder is None:
         problems.append(f"{where}.file: a recording carries the keys of its sensor files and names none, got {name}")
     elif name is not None:
-        return {**_from_file(folder / name, where, problems), **own}
+        found = _from_file(folder / name, where, problems)
+        problems += [
+            f"{where}: {key.name} = {own[key.name]!r} cannot stand beside file, whose sheet was cut for "
+            f"{found[key.name]!r}: leave it out"
+            for key in CONE_KEYS
+            if key.name in own and own[key.name] != found.get(key.name, own[key.name])
+        ]
+        return {**found, **own}
     return own
 
 
