@@ -50,6 +50,13 @@ def test_a_child_that_cannot_start_is_said(monkeypatch):
 
 @pytest.mark.promise("P68")
 @pytest.mark.long
+def test_a_limit_of_memory_under_which_a_child_would_end_is_said(monkeypatch):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (300 * 2**20, -1))
+    with pytest.raises(RobotConnectionError, match=r"300 MB .* 400 MB: raise the limit \(ulimit -v\)"):
+        spawn("coneskin.nothing")
+
+
 def test_a_child_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
     for name in ("json", "serial", "socket"):
         (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w').write('{name}')")

@@ -31,7 +31,22 @@ if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to 
     import subprocess
 
 _END_TIMEOUT = 2.0  # s for a process to end by itself
+_MIN_MEMORY = 400 * 2**20  # bytes that a process must be let take: one that loads numpy asks for 350 MB of addresses
 _LENGTH_FIELD = struct.Struct("<I")  # of what a child is told over its standard input
+
+
+def _check_memory() -> None:
+    """Raise RobotConnectionError where a child would end for want of memory, by the limit that it inherits."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < _MIN_MEMORY:
+        raise RobotConnectionError(
+            f"a process may take {limit / 2**20:.0f} MB of memory here, and one of coneskin needs up to "
+            f"{_MIN_MEMORY / 2**20:.0f} MB: raise the limit (ulimit -v)"
+        )
 
 
 def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
@@ -44,10 +59,11 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
         ends: sockets for the child, closed here afterwards.
 
     Raises:
-        RobotConnectionError: the process cannot be started.
+        RobotConnectionError: the process cannot be started, or may take too little memory.
     """
     import subprocess
 
+    _check_memory()
     command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
     try:
         if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
