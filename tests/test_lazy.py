@@ -190,7 +190,7 @@ def test_what_is_not_named_is_not_loaded(case: str, tmp_path: Path, a_run: str) 
 
 
 def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Path) -> None:
-    unneeded = {"arm.models", "arm.ur_models", "reaction.retreat", "guard.arm_supervisor", "ur.state_reader"}
+    unneeded = {"arm.models", "reaction.retreat", "guard.arm_supervisor", "ur.state_reader"}
     unneeded |= {"arm.kinematics", "ur.rtde_codec"}
     assert not known({f"coneskin.robot.{name}" for name in unneeded}) & modules(
         _NO_TOUCH, _BUILD, tmp_path / "scene.toml", ""

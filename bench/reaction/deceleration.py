@@ -16,8 +16,8 @@ import random
 
 from bench.report import head, quantile, show
 from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
-from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.kinematics import point_jacobian
+from coneskin.robot.arm.models import JOINT_COUNT, arm_model
 
 PAYLOAD_MASSES = {
     "UR3": 3.0,
@@ -33,7 +33,7 @@ PAYLOAD_MASSES = {
 MEASURED_STOPS = {"UR5": (0.244, 0.530, 0.164), "UR3": (0.159, 0.154, 0.092)}
 STOP_SPEED = math.radians(183.0)
 STRETCHED_JOINTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-ZERO_JOINTS = (0.0,) * JOINTS
+ZERO_JOINTS = (0.0,) * JOINT_COUNT
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 
 
@@ -41,9 +41,9 @@ def possible(name: str, q: tuple[float, ...], payload: float) -> list[float]:
     """Return the deceleration that each joint's motor can give in the worse direction [rad/s2]."""
     model, inertia = arm_model(name), arm_inertia(arm_model(name))
     turned, weight = mass_matrix(model, inertia, q), joint_torques(model, inertia, q, ZERO_JOINTS, ZERO_JOINTS)
-    rows = point_jacobian(model, q, JOINTS)
+    rows = point_jacobian(model, q, JOINT_COUNT)
     found = []
-    for joint in range(JOINTS):
+    for joint in range(JOINT_COUNT):
         arm2 = sum(row[joint] ** 2 for row in rows)
         held = abs(weight[joint] + payload * GRAVITY * rows[2][joint])
         left = max(0.0, inertia.torque[joint] - held)
@@ -54,7 +54,7 @@ def possible(name: str, q: tuple[float, ...], payload: float) -> list[float]:
 def measure(name: str, positions: int) -> list[dict[str, object]]:
     """Return the lines of one arm: bare and with payload."""
     rng = random.Random(name)
-    places = [tuple(rng.uniform(-math.pi, math.pi) for _ in range(JOINTS)) for _ in range(positions)]
+    places = [tuple(rng.uniform(-math.pi, math.pi) for _ in range(JOINT_COUNT)) for _ in range(positions)]
     lines = []
     for payload in (0.0, PAYLOAD_MASSES[name]):
         by_joint = list(zip(*(possible(name, q, payload) for q in places), strict=True))

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
-from .kinematics import JOINTS, link_poses, point_jacobian
+from .kinematics import link_poses, point_jacobian
 from .model import ArmModel, Joints
 from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
@@ -60,7 +60,7 @@ class ArmInertia:
     """Inertia of an arm, and what its joints can hold.
 
     Attributes:
-        links: the six moving links, shoulder to wrist 3.
+        links: that move, from the base on.
         torque: highest torque of each joint [N m].
         rotor: inertia of each motor's rotor as the joint feels it, through the gear [kg m^2].
     """
@@ -71,7 +71,7 @@ class ArmInertia:
 
 
 def mass_matrix(model: ArmModel, inertia: ArmInertia, q: Sequence[float]) -> list[list[float]]:
-    """Return the mass matrix, 6 x 6 [kg m^2]: the sum of Jv^T m Jv + Jw^T I Jw over the links, and the rotors.
+    """Return the mass matrix, n x n [kg m^2]: the sum of Jv^T m Jv + Jw^T I Jw over the links, and the rotors.
 
     Args:
         model: the nominal arm; the DH frames of a calibrated one may be far from its links.
@@ -79,11 +79,11 @@ def mass_matrix(model: ArmModel, inertia: ArmInertia, q: Sequence[float]) -> lis
         q: joint positions [rad].
 
     Raises:
-        KinematicsError: q has not six finite numbers.
+        KinematicsError: q has not a finite number for each joint.
     """
     poses = link_poses(model, q)
     axes = [pose.rotate((0.0, 0.0, 1.0)) for pose in poses[:-1]]
-    m = [[inertia.rotor[i] if i == j else 0.0 for j in range(JOINTS)] for i in range(JOINTS)]
+    m = [[inertia.rotor[i] if i == j else 0.0 for j in range(model.joints)] for i in range(model.joints)]
     for index, link in enumerate(inertia.links, 1):
         rows = point_jacobian(model, q, index, link.centre)
         back = _columns(poses[index].rotation)  # base frame -> frame of the link
@@ -110,7 +110,7 @@ def joint_torques(
         qdd: joint accelerations [rad/s^2].
 
     Raises:
-        KinematicsError: q has not six finite numbers.
+        KinematicsError: q has not a finite number for each joint.
     """
     poses = link_poses(model, q)
     spin: Vector = (0.0, 0.0, 0.0)  # of the link, and its rate; the acceleration of its frame's origin
@@ -130,10 +130,10 @@ def joint_torques(
         local = _apply(back, spin)
         turning = added(_apply(link.tensor, _apply(back, rate)), cross(local, _apply(link.tensor, local)))
         loads.append((centre, force, pose.rotate(turning)))
-    torques = [0.0] * JOINTS
+    torques = [0.0] * model.joints
     carried: Vector = (0.0, 0.0, 0.0)  # force of all links beyond a joint, and their torque about the base's origin
     turned: Vector = (0.0, 0.0, 0.0)
-    for i in reversed(range(JOINTS)):
+    for i in reversed(range(model.joints)):
         centre, force, turning = loads[i]
         carried = added(carried, force)
         turned = added(turned, added(turning, cross(centre, force)))

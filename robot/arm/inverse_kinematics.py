@@ -112,7 +112,7 @@ def nearest(model: ArmModel, flange: Pose, seed: Sequence[float]) -> Joints:
         distance = sum((angle - near) ** 2 for angle, near in zip(wound, seed, strict=True) if angle is not None)
         if distance < least:
             least = distance
-            best = tuple(wound)  # type: ignore[assignment]
+            best = tuple(wound)  # type: ignore[arg-type]
     if best is None:
         x, y, z = flange.translation
         raise KinematicsError(

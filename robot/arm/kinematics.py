@@ -2,7 +2,7 @@
 
     symbol    meaning
     q         joint positions [rad]
-    x, y, z   axes of a DH frame, o its origin [m], all in the base frame; frame 0 is the base, 6 the flange
+    x, y, z   axes of a DH frame, o its origin [m], all in the base frame; frame 0 is the base, the last the flange
     J         velocity of a point [m/s] = J @ joint speeds [rad/s]; joint i turns about z of frame i-1, so that
               column i = z_{i-1} x (p - o_{i-1})
 
@@ -42,9 +42,8 @@ from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 
 from .model import ArmModel, Joints
+from .models import is_ur
 from .vectors import added, cross, dot, minus, scaled
-
-JOINTS = 6  #: number of joints
 
 #: x, y and z axes and origin of a DH frame in the base frame
 _Frame = tuple[Vector, Vector, Vector, Vector]
@@ -54,27 +53,27 @@ def forward(model: ArmModel, q: Sequence[float]) -> Pose:
     """Return the pose of the flange in the base frame at joint positions q [rad].
 
     Raises:
-        KinematicsError: q has not six finite numbers.
+        KinematicsError: q has not a finite number for each joint.
     """
-    return link_pose(model, q, JOINTS)
+    return link_pose(model, q, model.joints)
 
 
 def link_pose(model: ArmModel, q: Sequence[float], link: int) -> Pose:
-    """Return the pose of the DH frame of a link (0 base .. 6 flange) in the base frame at joint positions q [rad].
+    """Return the pose of the DH frame of a link (0 base .. n flange) in the base frame at joint positions q [rad].
 
     Raises:
-        KinematicsError: q has not six finite numbers, or there is no such link.
+        KinematicsError: q has not a finite number for each joint, or there is no such link.
     """
     return _pose(_frames(model, q, link)[-1])
 
 
 def link_poses(model: ArmModel, q: Sequence[float]) -> tuple[Pose, ...]:
-    """Return the poses of all seven DH frames, 0 base .. 6 flange, in the base frame at joint positions q [rad].
+    """Return the poses of all DH frames, 0 base .. n flange, in the base frame at joint positions q [rad].
 
     Raises:
-        KinematicsError: q has not six finite numbers.
+        KinematicsError: q has not a finite number for each joint.
     """
-    return tuple(_pose(frame) for frame in _frames(model, q, JOINTS))
+    return tuple(_pose(frame) for frame in _frames(model, q, model.joints))
 
 
 class PlacedPoint(NamedTuple):
@@ -105,13 +104,13 @@ def place_point(
 
     Args:
         model: the arm.
-        q: joint positions [rad], 6 numbers.
-        link: link that carries the point, 0 (base) to 6 (flange).
+        q: joint positions [rad].
+        link: link that carries the point, 0 (base) to n (flange).
         p_link: point in the DH frame of that link [m].
         direction: unit vector in that frame.
 
     Raises:
-        KinematicsError: q has not six finite numbers, or there is no such link.
+        KinematicsError: q has not a finite number for each joint, or there is no such link.
     """
     frames = _frames(model, q, link)
     x, y, z, origin = frames[-1]
@@ -123,21 +122,21 @@ def place_point(
 def point_jacobian(
     model: ArmModel, q: Sequence[float], link: int, p_link: Vector = (0.0, 0.0, 0.0)
 ) -> tuple[Joints, Joints, Joints]:
-    """Return x, y and z rows of the Jacobian of a point as ``place_point`` takes it [m/rad], 3 x 6.
+    """Return x, y and z rows of the Jacobian of a point as ``place_point`` takes it [m/rad], 3 x n.
 
     Columns beyond the link are zero.
 
     Raises:
-        KinematicsError: q has not six finite numbers, or there is no such link.
+        KinematicsError: q has not a finite number for each joint, or there is no such link.
     """
-    return _rows(place_point(model, q, link, p_link).columns)
+    return _rows(place_point(model, q, link, p_link).columns, model.joints)
 
 
 def link_motion(model: ArmModel, q: Sequence[float], qd: Sequence[float], link: int) -> tuple[Vector, Vector]:
     """Return the velocity of the origin of a link's DH frame [m/s] and the turning of the link [rad/s], in that frame.
 
     Raises:
-        KinematicsError: q has not six finite numbers, or there is no such link.
+        KinematicsError: q has not a finite number for each joint, or there is no such link.
     """
     *joints, (x, y, z, origin) = _frames(model, q, link)
     velocity = turn = (0.0, 0.0, 0.0)
@@ -151,13 +150,13 @@ def link_motion(model: ArmModel, q: Sequence[float], qd: Sequence[float], link: 
 
 
 def flange_jacobian(model: ArmModel, q: Sequence[float]) -> tuple[Joints, Joints, Joints, Joints, Joints, Joints]:
-    """Return the 6 x 6 Jacobian of the flange: three rows for its velocity [m/rad], three for its angular velocity.
+    """Return the 6 x n Jacobian of the flange: three rows for its velocity [m/rad], three for its angular velocity.
 
     Raises:
-        KinematicsError: q has not six finite numbers.
+        KinematicsError: q has not a finite number for each joint.
     """
-    axes = [z for _, _, z, _ in _frames(model, q, JOINTS)[:-1]]
-    return *point_jacobian(model, q, JOINTS), *_rows(axes)
+    axes = [z for _, _, z, _ in _frames(model, q, model.joints)[:-1]]
+    return *point_jacobian(model, q, model.joints), *_rows(axes, model.joints)
 
 
 def cos_sin(twist: float) -> tuple[float, float]:
@@ -169,14 +168,15 @@ def cos_sin(twist: float) -> tuple[float, float]:
 
 def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
     """Return the DH frames 0 .. last."""
-    if not 0 <= last <= JOINTS:
-        raise KinematicsError(f"link must be 0 (base) to 6 (flange), got {last}")
-    if len(q) != JOINTS or not all(math.isfinite(angle) for angle in q):
-        raise KinematicsError(f"q must be 6 finite joint positions [rad], got {tuple(q)}")
+    joints, theta = model.joints, model.theta
+    if not 0 <= last <= joints:
+        raise KinematicsError(f"link must be 0 (base) to {joints} (flange), got {last}")
+    if len(q) != joints or not all(math.isfinite(angle) for angle in q):
+        raise KinematicsError(f"q must be {joints} finite joint positions [rad], got {tuple(q)}")
     x, y, z, o = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     frames = [(x, y, z, o)]
     for i in range(last):
-        turn = q[i] + model.theta[i]
+        turn = q[i] + (theta[i] if theta else 0.0)
         x, y = _turned(x, y, math.cos(turn), math.sin(turn))
         o = added(o, added(scaled(z, model.d[i]), scaled(x, model.a[i])))
         y, z = _turned(y, z, *cos_sin(model.alpha[i]))
@@ -203,10 +203,10 @@ def _pose(frame: _Frame) -> Pose:
     return Pose.trusted(((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), o)
 
 
-def _rows(columns: list[Vector]) -> tuple[Joints, Joints, Joints]:
-    """Return up to six columns of three as three rows of six, with zeros on the right."""
-    a, b, c, d, e, f = columns + [(0.0, 0.0, 0.0)] * (JOINTS - len(columns))
-    x, y, z = ((a[k], b[k], c[k], d[k], e[k], f[k]) for k in range(3))
+def _rows(columns: list[Vector], joints: int) -> tuple[Joints, Joints, Joints]:
+    """Return columns of three as three rows of as many numbers as there are joints, with zeros on the right."""
+    zeros = (0.0,) * (joints - len(columns))
+    x, y, z = ((*(column[k] for column in columns), *zeros) for k in range(3))
     return x, y, z
 
 
@@ -230,6 +230,7 @@ _TUBE_OFFSETS = {
     "UR30": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
 }
 
+_MAX_LINKS = 100  # of any arm
 MESHED_ARMS = frozenset(_TUBE_OFFSETS)  #: arms of which it is known where the meshes of their links lie
 
 _QUARTER_TURN = math.pi / 2.0  # rad
@@ -249,10 +250,31 @@ _TURNED_FRAME = {
 def link_index(link: str) -> int:
     """Return the index of the DH frame that moves with a link; "upperarm", "upper_arm", "upper-arm_link" are the same.
 
+    The links of any arm are link_1, link_2 and so on as well.
+
     Raises:
         KinematicsError: there is no such link; the message lists all.
     """
-    return LINK_INDEX[_name(link)]
+    plain = "".join(ch for ch in link.lower().removesuffix("_link") if ch.isalnum())
+    for name, index in LINK_INDEX.items():
+        if plain in (name.replace("_", ""), f"link{index}"):
+            return index
+    if plain.startswith("link") and plain[4:].isdecimal() and int(plain[4:]) < _MAX_LINKS:
+        return int(plain[4:])
+    raise KinematicsError(
+        f"link must be one of {', '.join(LINK_INDEX)}, or link_1, link_2 and so on of another maker's arm, got {link!r}"
+    )
+
+
+def link_name(index: int) -> str:
+    """Return the name of the link that moves with a DH frame: that of a UR arm's, beyond them link_7 and so on."""
+    return next((name for name, number in LINK_INDEX.items() if number == index), f"link_{index}")
+
+
+def _ur_name(model: ArmModel, index: int) -> str:
+    if index > model.joints:
+        raise KinematicsError(f"link must be one of {', '.join(LINK_INDEX)}, got link_{index}")
+    return link_name(index)
 
 
 def link_mesh(model: ArmModel, link: str) -> Pose:
@@ -261,14 +283,15 @@ def link_mesh(model: ArmModel, link: str) -> Pose:
     Raises:
         KinematicsError: there is no such link, or the meshes of the arm are not known.
     """
-    name = _name(link)
+    index = link_index(link)
     offsets = _TUBE_OFFSETS.get(model.name)
     if offsets is None:
+        frames = '"urdf" or "dh"' if is_ur(model) else '"dh"'
         raise KinematicsError(
             f"meshes are known for {', '.join(_TUBE_OFFSETS)}, got the arm {model.name!r}: place its sensors with "
-            'frame = "urdf" or "dh" in [[link]]'
+            f"frame = {frames} in [[link]]"
         )
-    index = LINK_INDEX[name]
+    name = _ur_name(model, index)
     along = offsets[index - 2] if index >= 2 else 0.0
     aside = offsets[5] if index == 6 else 0.0
     return Pose.from_xyz_rpy((0.0, aside, along), _TURNED_FRAME[name])
@@ -278,10 +301,12 @@ def dh_link(model: ArmModel, link: str) -> Pose:
     """Return the pose of the URDF frame of a link in its DH frame: p_dh = dh_link(...).apply(p_urdf).
 
     Raises:
-        KinematicsError: there is no such link.
+        KinematicsError: there is no such link, or the arm is another maker's, whose URDF is not known.
     """
-    name = _name(link)
-    index = LINK_INDEX[name]
+    index = link_index(link)
+    if not is_ur(model):
+        raise KinematicsError(f'the URDF of the arm {model.name!r} is not known: use frame = "dh" in [[link]]')
+    name = _ur_name(model, index)
     if index == 0:
         return Pose()
     if name not in ("upper_arm", "forearm"):
@@ -328,11 +353,3 @@ def _passive(model: ArmModel, i: int, d: float) -> Pose:
 def _about_z(angle: float) -> Pose:
     c, s = math.cos(angle), math.sin(angle)
     return Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
-
-
-def _name(link: str) -> str:
-    plain = "".join(ch for ch in link.lower().removesuffix("_link") if ch.isalnum())
-    for name in LINK_INDEX:
-        if plain == name.replace("_", ""):
-            return name
-    raise KinematicsError(f"link must be one of {', '.join(LINK_INDEX)}, got {link!r}")

@@ -1,7 +1,7 @@
-"""Geometry and limits of a six-joint arm of any make.
+"""Geometry and limits of an arm of any make.
 
-Standard (distal) DH: frame i-1 goes to frame i by Rz(q_i + theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i), i = 1..6. Frame 0 is
-the controller's *base*, frame 6 its *flange* (the TCP of an arm without a tool).
+Standard (distal) DH: frame i-1 goes to frame i by Rz(q_i + theta_i) Tz(d_i) Tx(a_i) Rx(alpha_i), i = 1..n. Frame 0 is
+the controller's *base*, frame n its *flange* (the TCP of an arm without a tool).
 """
 
 from __future__ import annotations
@@ -13,17 +13,27 @@ from dataclasses import dataclass, replace
 from coneskin.core.errors import KinematicsError
 
 #: one number for each joint, from the base on
-Joints = tuple[float, float, float, float, float, float]
+Joints = tuple[float, ...]
 
-_SIX_ZEROS: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-#: joint speeds of an arm at rest [rad/s]
-ZERO_VELOCITY: Joints = _SIX_ZEROS
+@dataclass(frozen=True, slots=True)
+class JointCurrents:
+    """What the motor currents of an arm say of the torques on its joints.
+
+    Attributes:
+        torque_per_ampere: of each joint [N m/A].
+        min_unexplained: torque of each joint that counts as nothing, without noise and friction [N m].
+        max_unexplained: the same, however large noise and friction are [N m].
+    """
+
+    torque_per_ampere: Joints
+    min_unexplained: Joints
+    max_unexplained: Joints
 
 
 @dataclass(frozen=True, slots=True)
 class ArmModel:
-    """Geometry and limits of one six-joint arm.
+    """Geometry and limits of one arm, of as many joints as its table has rows.
 
     Attributes:
         name: name that its maker gives it, such as "UR10e".
@@ -33,11 +43,13 @@ class ArmModel:
         joint_lower: lowest joint positions [rad]; -inf where a joint turns without end.
         joint_upper: highest joint positions [rad]; inf where a joint turns without end.
         joint_speed: highest joint speeds [rad/s].
-        theta: DH joint angles at q = 0 [rad]; zero unless the arm is calibrated.
-        family: of arms that one driver moves, such as "ur" (``coneskin.robot.driver.registry``).
+        theta: DH joint angles at q = 0 [rad]; empty where all are zero.
+        driver: "module:object" of the driver of its controller (``coneskin.robot.driver.protocol``).
+        currents: of its motors; None where it is not known what they say: then nothing moves the arm away.
 
     Raises:
-        KinematicsError: a number is not finite, a joint's limits are not in order, or its speed is not above 0.
+        KinematicsError: a row is missing, a number is not finite, a joint's limits are not in order, or its speed is
+            not above 0.
     """
 
     name: str
@@ -47,12 +59,21 @@ class ArmModel:
     joint_lower: Joints
     joint_upper: Joints
     joint_speed: Joints
-    theta: Joints = _SIX_ZEROS
-    family: str = ""
+    theta: Joints = ()
+    driver: str = ""
+    currents: JointCurrents | None = None
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.a)
 
     def __post_init__(self) -> None:
-        for field in ("a", "d", "alpha", "theta", "joint_speed"):
-            _check_six(getattr(self, field), f"{field} of {self.name}")
+        rows = {"a": self.a, "d": self.d, "alpha": self.alpha, "theta": self.theta or self.a, "speed": self.joint_speed}
+        for name, values in rows.items():
+            _check_row(values, max(1, self.joints), f"{name} of {self.name}")
+        if not len(self.joint_lower) == len(self.joint_upper) == self.joints:
+            raise KinematicsError(f"joint_lower and joint_upper of {self.name} must be {self.joints} numbers each")
         for lower, upper, speed in zip(self.joint_lower, self.joint_upper, self.joint_speed, strict=True):
             if not lower < upper:
                 raise KinematicsError(
@@ -63,10 +84,10 @@ class ArmModel:
 
     def calibrated(
         self,
-        delta_a: Sequence[float] = _SIX_ZEROS,
-        delta_d: Sequence[float] = _SIX_ZEROS,
-        delta_alpha: Sequence[float] = _SIX_ZEROS,
-        delta_theta: Sequence[float] = _SIX_ZEROS,
+        delta_a: Sequence[float] = (),
+        delta_d: Sequence[float] = (),
+        delta_alpha: Sequence[float] = (),
+        delta_theta: Sequence[float] = (),
     ) -> ArmModel:
         """Return the arm with the factory calibration of one robot (``calibration.conf`` on its controller).
 
@@ -74,29 +95,30 @@ class ArmModel:
         and 3 are then far from the arm, which `dh_link` takes into account.
 
         Args:
-            delta_a: added to a [m], 6 numbers.
-            delta_d: added to d [m], 6 numbers.
-            delta_alpha: added to alpha [rad], 6 numbers.
-            delta_theta: added to the joint angles [rad], 6 numbers.
+            delta_a: added to a [m], for each joint; empty for none.
+            delta_d: added to d [m], likewise.
+            delta_alpha: added to alpha [rad], likewise.
+            delta_theta: added to the joint angles [rad], likewise.
 
         Raises:
-            KinematicsError: a delta does not have six finite numbers.
+            KinematicsError: a delta does not have a finite number for each joint.
         """
         return replace(
             self,
             a=_sum(self.a, delta_a, "delta_a"),
             d=_sum(self.d, delta_d, "delta_d"),
             alpha=_sum(self.alpha, delta_alpha, "delta_alpha"),
-            theta=_sum(self.theta, delta_theta, "delta_theta"),
+            theta=_sum(self.theta or (0.0,) * self.joints, delta_theta, "delta_theta"),
         )
 
 
-def _check_six(values: Sequence[float], name: str) -> None:
-    if len(values) != 6 or not all(math.isfinite(value) for value in values):
-        raise KinematicsError(f"{name} must be 6 finite numbers, got {tuple(values)}")
+def _check_row(values: Sequence[float], joints: int, name: str) -> None:
+    if len(values) != joints or not all(math.isfinite(value) for value in values):
+        raise KinematicsError(f"{name} must be {joints} finite numbers, got {tuple(values)}")
 
 
 def _sum(nominal: Joints, delta: Sequence[float], name: str) -> Joints:
-    _check_six(delta, name)
-    first, second, third, fourth, fifth, sixth = (x + dx for x, dx in zip(nominal, delta, strict=True))
-    return first, second, third, fourth, fifth, sixth
+    if not delta:
+        return nominal
+    _check_row(delta, len(nominal), name)
+    return tuple(x + dx for x, dx in zip(nominal, delta, strict=True))

@@ -9,14 +9,14 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
 from .kinematics import LINK_INDEX, dh_mesh, link_poses
 from .model import ArmModel, Joints
-from .models import MODEL_NAMES, arm_model
+from .models import MODEL_NAMES, arm_model, is_ur
 from .vectors import dot, minus
 
 #: distance kept from a joint's limit [rad]
@@ -48,8 +48,8 @@ class JointLimits:
         """Return the limits of an arm whose joints brake with a deceleration [rad/s^2]."""
         lower, upper = model.joint_lower, model.joint_upper
         return cls(
-            lower=_six([limit + _LIMIT_MARGIN for limit in lower]),
-            upper=_six([limit - _LIMIT_MARGIN for limit in upper]),
+            lower=tuple(limit + _LIMIT_MARGIN for limit in lower),
+            upper=tuple(limit - _LIMIT_MARGIN for limit in upper),
             speed=model.joint_speed,
             braking=braking,
             reach=reach(model),
@@ -87,20 +87,19 @@ def reach(model: ArmModel) -> Joints:
     nominal = arm_model(model.name) if model.name in MODEL_NAMES else model
     steps = [math.hypot(a, d) for a, d in zip(nominal.a, nominal.d, strict=True)]
     # a joint's own d lies along its axis
-    return _six([abs(a) + sum(steps[i + 1 :]) + 0.1 for i, a in enumerate(nominal.a)])
-
-
-def _six(values: Sequence[float]) -> Joints:
-    first, second, third, fourth, fifth, sixth = values
-    return first, second, third, fourth, fifth, sixth
+    return tuple(abs(a) + sum(steps[i + 1 :]) + 0.1 for i, a in enumerate(nominal.a))
 
 
 def skeleton(model: ArmModel, q: Sequence[float]) -> list[Vector]:
     """Return the corners of a line from base to flange, in the base frame [m], at joint positions q [rad].
 
-    Upper arm and forearm lie beside the line between the origins of the DH table; their place is that of their meshes.
+    Upper arm and forearm of a UR arm lie beside the line between the origins of the DH table; their place is that of
+    their meshes. The line of another arm goes along each joint's axis, then along the link.
     """
     poses = link_poses(model, q)
+    if not is_ur(model):
+        ends = [(pose.apply((-a, 0.0, 0.0)), pose.translation) for a, pose in zip(model.a, poses[1:], strict=True)]
+        return [poses[0].translation, *chain.from_iterable(ends)]
     corners: list[Vector] = [poses[0].translation, poses[1].translation]
     for link, begin, end in _tubes(model):
         corners += [poses[link].apply(begin), poses[link].apply(end)]
@@ -128,7 +127,7 @@ _PART_NAMES = ("base", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "
 @functools.lru_cache(maxsize=32)
 def arm_parts(model: ArmModel) -> tuple[tuple[str, int, Vector, Vector], ...]:
     """Return the straight parts that joints move: name, index of the DH frame, and both ends in that frame [m]."""
-    poses = link_poses(model, (0.0,) * 6)  # no joint turns an end about another axis than that of its part
+    poses = link_poses(model, (0.0,) * model.joints)  # no joint turns an end about another axis than that of its part
     (upper, upper_begin, upper_end), (fore, fore_begin, fore_end) = _tubes(model)
     elbow_end = poses[upper].inverse().apply(poses[fore].apply(fore_begin))
     parts = [

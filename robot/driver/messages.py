@@ -14,7 +14,6 @@ from coneskin.robot.arm.model import Joints
 LEAVE = b"leave"  #: of the guarded program to a guard watchdog: it ends, and still listens
 
 _ONE_DOUBLE = struct.Struct("<d")
-_SEVEN_DOUBLES = struct.Struct("<7d")
 _ONE_NUMBER = struct.Struct("<Q")
 
 
@@ -45,7 +44,7 @@ class SetJointVelocity(NamedTuple):
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"V" + _SEVEN_DOUBLES.pack(*self.qd, self.acceleration)
+        return b"V" + struct.pack(f"<{len(self.qd) + 1}d", *self.qd, self.acceleration)
 
 
 class EndReaction(NamedTuple):
@@ -131,13 +130,13 @@ def decode_command(message: bytes) -> GuardCommand:
     letter, body = message[:1], message[1:]
     try:
         if letter == b"V":
-            *qd, acceleration = _SEVEN_DOUBLES.unpack(body)
-            return SetJointVelocity((qd[0], qd[1], qd[2], qd[3], qd[4], qd[5]), acceleration)
+            *qd, acceleration = struct.unpack(f"<{len(body) // _ONE_DOUBLE.size}d", body)
+            return SetJointVelocity(tuple(qd), acceleration)
         if letter == b"C":
             return Release(*_ONE_NUMBER.unpack(body))
         if letter in (b"S", b"H"):
             return (StopProgram if letter == b"S" else EndReaction)(*_ONE_DOUBLE.unpack(body))
-    except struct.error as exc:
+    except (struct.error, ValueError) as exc:
         raise ValueError(f"a command of the guard is damaged: {message!r}") from exc
     if message in _WORD_COMMANDS:
         return _WORD_COMMANDS[message]

@@ -113,7 +113,7 @@ class Waypoint(NamedTuple):
     Attributes:
         kind: of the move to it: "j" in joint space, "l" straight, "p" straight with a constant speed of the tool.
         joints: True where the target is joint positions, False where it is a pose of the tool.
-        target: six joint positions [rad], or a pose (x, y, z [m], rotation vector [rad]).
+        target: joint positions [rad], or a pose (x, y, z [m], rotation vector [rad]).
         speed: of the leading joint [rad/s], or of the tool [m/s].
         acceleration: of the leading joint [rad/s2], or of the tool [m/s2].
         blend: how far from it the arm may turn off towards the next one [m]; 0 stops there, and so does the last.

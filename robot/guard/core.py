@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
+from coneskin.robot.driver.protocol import HeartbeatDriver, SliderDriver, require
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.detection.detector import TouchAlarm
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
@@ -247,6 +248,10 @@ class GuardCore:
         what, decode = "the controller's state cannot be read", partial(arm.driver.decode_state, block.time)
         if (state := self._decode(block, what, decode, out)) is None:
             return
+        joints = arm.model.joints
+        if len(state.q) != joints or len(state.qd) != joints or not math.isfinite(sum(state.q) + sum(state.qd)):
+            self._add_fault(block.time, f"{what}: {joints} finite positions and speeds were expected", out, what)
+            return
         now = state.time
         arm.sample(state, out)
         if (stepped := arm.state_age.stepped) and arm.phase is not Phase.STARTING:
@@ -270,7 +275,7 @@ class GuardCore:
             emit(out, EventName.MESSAGE, now, what=trouble)
 
     def _feed_slider(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
-        decode = arm.driver.decode_speed_fraction
+        decode = require(arm.driver, SliderDriver).decode_speed_fraction
         fraction = self._decode(block, "the speed slider cannot be read", decode, out)
         if fraction is not None:
             arm.speed_reduction.feed(block.time, fraction)
@@ -280,7 +285,7 @@ class GuardCore:
         if arm.heartbeat is None:
             return
         what = "the program's answer to the heartbeat cannot be read"
-        count = self._decode(block, what, arm.driver.decode_heartbeat, out)
+        count = self._decode(block, what, require(arm.driver, HeartbeatDriver).decode_heartbeat, out)
         if count is not None:
             arm.heartbeat.feed(count)
 

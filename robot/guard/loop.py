@@ -21,7 +21,14 @@ from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.liveness import BEAT_PERIOD
 from coneskin.robot.driver.messages import Heartbeat, Shutdown, StopProgram
-from coneskin.robot.driver.protocol import HeartbeatWriter, PayloadReader, SetpointWriter, SpeedSlider, StopConnections
+from coneskin.robot.driver.protocol import (
+    HeartbeatWriter,
+    PayloadReader,
+    ProgramStarter,
+    SetpointWriter,
+    SpeedSlider,
+    StopConnections,
+)
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
 
@@ -111,7 +118,7 @@ class _Outbox:
         if isinstance(output, JointVelocitySetpoint):
             return ports.setpoints is not None and ports.setpoints.write(output)
         if isinstance(output, SetpointProgram):
-            return ports.stops is not None and ports.stops.follow(output)
+            return isinstance(ports.stops, ProgramStarter) and ports.stops.follow(output)
         if isinstance(output, SetSpeedSlider):
             return ports.slider is not None and ports.slider.set(output.fraction)
         channel = ports.driver if ports.watchdog is None else ports.watchdog

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
+from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
 from .contact_supervision import clamped, opposed
@@ -95,7 +95,7 @@ class _AdmittanceMotion:
             # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
             gentle = placed and not against
             rate = reaction.acceleration if gentle else max(reaction.acceleration, reaction.deceleration)
-            return JointVelocity(ZERO_VELOCITY, rate, 0.0, progress, clipped_by)
+            return JointVelocity((0.0,) * len(state.q), rate, 0.0, progress, clipped_by)
         setting = replace(reaction, speed=speed, distance=reaction.distance - progress)
         plan = plan_retreat(self._model, state, contacts, setting, self._space, self._sweep)
         step = plan if isinstance(plan, Done) else retreat_step(plan, state)
@@ -104,13 +104,12 @@ class _AdmittanceMotion:
             return Done(step.reason, progress)
         clipped, driven = step.clipped_by, 0.0
         if step.away > 0.0:
-            rows = zip(state.torque, state.doubt, step.qd, strict=True)
+            rows = zip(state.torque, state.doubt or (0.0,) * len(step.qd), step.qd, strict=True)
             driven = sum(t * v - doubt * abs(v) for t, doubt, v in rows) / step.away
         if step.away > (most := max(0.0, self._free_push(driven, contacts)) / _PUSH_DAMPING):
             share = most / step.away
-            a, b, c, d, e, f = (share * v for v in step.qd)
             rate = reaction.deceleration if most < self.speed else reaction.acceleration
-            step = replace(step, qd=(a, b, c, d, e, f), away=most, acceleration=rate)
+            step = replace(step, qd=tuple(share * v for v in step.qd), away=most, acceleration=rate)
             clipped, speed = (*clipped, "push"), most
         if wanted < reaction.speed:
             clipped += ("level",)

@@ -129,7 +129,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         state: the arm as measured.
     """
     reaction, limits = plan.reaction, plan.limits
-    q = state.q
+    q, qd = state.q, state.qd or (0.0,) * len(state.q)
     if not math.isfinite(sum(q)):
         return Done(f"joint positions must be finite, got {q} rad")
     placed = [place_point(plan.model, q, track.link, track.point) for track in plan.tracks]
@@ -149,7 +149,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     while away >= MIN_PROGRESS:
         speed, clipped = _speed(reaction, limits, speeds, away, left, room)
         wanted = [speed * value for value in speeds]
-        blocked = limits.blocked(q, state.qd, wanted)
+        blocked = limits.blocked(q, qd, wanted)
         if not blocked:
             break
         locked += blocked
@@ -160,11 +160,10 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         clipped += tuple(f"joint {i + 1} limit" for i in sorted(locked))
     if damping > DAMPING_FLOOR:
         clipped += ("singularity",)
-    wanted += [0.0] * (6 - len(wanted))
+    wanted += [0.0] * (len(q) - len(wanted))
     if plan.space is not None and (why := plan.space.obstruction(q, wanted, limits.braking)):
         return Done(why, progress)
-    a, b, c, d, e, f = wanted
-    return JointVelocity((a, b, c, d, e, f), reaction.acceleration, speed * away, progress, clipped)
+    return JointVelocity(tuple(wanted), reaction.acceleration, speed * away, progress, clipped)
 
 
 def _speed(

@@ -33,8 +33,8 @@ class Rule:
     speed_above: float | None = None
 
     def __post_init__(self) -> None:
-        if self.link is not None and not 0 <= self.link <= 6:
-            raise RobotRefused(f"a rule's link must be 0 (base) to 6 (flange), got {self.link}")
+        if self.link is not None and self.link < 0:
+            raise RobotRefused(f"a rule's link must be 0 (base) or a link beyond it, got {self.link}")
         for name, unit in (("level_above", ""), ("speed_above", " rad/s")):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value >= 0.0):

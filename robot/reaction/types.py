@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Vector
-from coneskin.robot.arm.model import ZERO_VELOCITY
 
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
@@ -26,16 +25,16 @@ class ArmState:
     Attributes:
         time: of the measurement, on the clock of the guard [s].
         q: joint positions [rad].
-        qd: joint speeds [rad/s].
+        qd: joint speeds [rad/s]; empty where it stands.
         torque: from outside on the joints [N m]. None where it is not measured.
-        doubt: largest torque that was seen on each joint while nothing touched [N m].
+        doubt: largest torque that was seen on each joint while nothing touched [N m]; empty for none.
     """
 
     time: float
     q: Joints
-    qd: Joints = ZERO_VELOCITY
+    qd: Joints = ()
     torque: Joints | None = None
-    doubt: Joints = ZERO_VELOCITY
+    doubt: Joints = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +42,7 @@ class ContactOnLink:
     """Touch on a link, as the reaction sees it.
 
     Attributes:
-        link: index of the DH frame that moves with the touched link, 0 (base) to 6.
+        link: index of the DH frame that moves with the touched link, 0 (base) to the flange.
         point: where, in that frame [m].
         normal: outward unit normal of the skin there, in that frame; what touches is on its side.
         level: how strong, in the detector's unit.

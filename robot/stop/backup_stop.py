@@ -64,7 +64,8 @@ class StandstillHold:
         self._limits = limits
         self._deceleration = deceleration
         self._clock = clock
-        self._stop = ArmStop(limits, _STOP_PATHS)
+        own = frozenset[StopPath]().union(*driver.lost_with.values())
+        self._stop = ArmStop(limits, tuple(path for path in _STOP_PATHS if path in own))
         self._state: ControllerState | None = None  # the newest
         self._age = StateAge(limits.arm_silence)
         self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried

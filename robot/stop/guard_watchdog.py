@@ -28,8 +28,7 @@ from coneskin.robot.driver.messages import (
     StopProgram,
     decode_command,
 )
-from coneskin.robot.driver.protocol import PayloadReader
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import PayloadReader, load_driver
 
 from .backup_stop import StandstillHold
 from .limits import MonitoringLimits
@@ -132,7 +131,7 @@ def main(arguments: list[str]) -> int:
     limits = MonitoringLimits(**settings["monitoring"])
     host = settings["host"]
     try:
-        driver, second = load_driver(settings["family"]), bool(settings.get("second"))
+        driver, second = load_driver(settings["driver"]), bool(settings.get("second"))
         with ExitStack() as stack:
             connections, reader = driver.stop_connections(host, _CONNECT_TIMEOUT), None
             if not second:

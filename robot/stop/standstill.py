@@ -41,8 +41,8 @@ class _StandstillMonitor:
         self.crept = crept
         self._q: Joints | None = None  # as measured last
         self._ran = False
-        self._drift = [0.0] * 6  # by programs
-        self._touched_drift = [0.0] * 6  # the part of it while touched
+        self._drift: list[float] = []  # by programs
+        self._touched_drift: list[float] = []  # the part of it while touched
         self._moving = 0  # samples in a row
 
     def moved(self, state: ControllerState, touched: bool) -> bool:
@@ -59,11 +59,12 @@ class _StandstillMonitor:
         if last is None or not (state.program_running or ran):  # a program's last step belongs to it
             return False
         self._moving = self._moving + 1 if state.speed > (self._standstill if touched else _MAX_SPEED) else 0
-        for i in range(6):
-            step = state.q[i] - last[i]
-            self._drift[i] += step
+        if not self._drift:
+            self._drift, self._touched_drift = [0.0] * len(last), [0.0] * len(last)
+        for i, (now, before) in enumerate(zip(state.q, last, strict=True)):
+            self._drift[i] += now - before
             if touched:
-                self._touched_drift[i] += step
+                self._touched_drift[i] += now - before
         here = sum(map(abs, self._touched_drift))
         self.crept = self._before + here
         return (

@@ -23,7 +23,7 @@ from coneskin.robot.driver.protocol import ExaminationScope
 from .input_writers import HEARTBEAT_INPUTS, SETPOINT_INPUTS, SLIDER_INPUTS
 from .model_check import check_model, read_pose
 from .rtde_codec import decode_state
-from .rtde_connection import PORT, RtdeConnection
+from .rtde_connection import RtdeConnection
 from .state_reader import StateReader
 from .stop_sockets import StopSockets
 
@@ -51,10 +51,16 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
     except ConeSkinError as exc:
         rest = ("model", "state", "registers", "latency", "stops")
         return [
-            Finding("arm, RTDE", "bad", str(exc), f"{host}:{PORT} answers", "for a simulated one: coneskin sim-ur"),
+            Finding(
+                "arm, RTDE",
+                "bad",
+                str(exc),
+                f"{host}:{RtdeConnection.port} answers",
+                "for a simulated one: coneskin sim-ur",
+            ),
             *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
         ]
-    found = [Finding("arm, RTDE", "ok", f"{host}:{PORT} answers, software {major}.{minor}")]
+    found = [Finding("arm, RTDE", "ok", f"{host}:{RtdeConnection.port} answers, software {major}.{minor}")]
     found += _tried("arm, model", lambda: _model(arm, host))
     found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3_MAJOR else 0.002)))
     found += _tried("arm, stops", lambda: _stops(host))

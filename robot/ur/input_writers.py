@@ -22,7 +22,7 @@ from __future__ import annotations
 from typing import ClassVar, Self
 
 from coneskin.core.errors import ConeSkinError, RobotConnectionError, RobotRefused
-from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
 
 from . import rtde_codec as rtde

@@ -5,68 +5,40 @@ Its users decide what is read and written: ``state_reader``, ``input_writers``, 
 
 from __future__ import annotations
 
-import socket
 import struct
-import time
-from collections.abc import Callable, Sequence
-from typing import Self
+from collections.abc import Sequence
 
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
+from coneskin.robot.driver.tcp import TcpReader
 
 from . import rtde_codec as rtde
 
-PORT = 30004
-_CHECK_ADVICE = (
-    "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "
-    "Services), and that it is in remote control"
-)
 
-
-class RtdeConnection:
+class RtdeConnection(TcpReader):
     """One connection; open it in a ``with``, ask for variables, then ``start``.
-
-    Args:
-        host: the controller.
-        timeout: how long connecting and each reply may take [s].
-        clock: monotonic seconds.
 
     Raises:
         RobotConnectionError: the controller cannot be reached, or refuses.
         RobotTimeout: it does not answer.
     """
 
-    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
-        self.host = host
-        self._timeout = timeout
-        self._clock = clock
-        self._sock: socket.socket | None = None
-        self._rest = b""
+    port = 30004
+    advice = (
+        "check the address (arm.host), that the controller is on, that RTDE is enabled on it (Settings, Security, "
+        "Services), and that it is in remote control"
+    )
+
+    def prepare(self) -> None:
+        """Agree on the version of the protocol."""
         self._waiting: list[bytes] = []
-
-    def __enter__(self) -> Self:
-        try:
-            self._sock = socket.create_connection((self.host, PORT), self._timeout)
-        except TimeoutError as exc:
-            raise self._silent() from exc
-        except OSError as exc:
-            raise RobotConnectionError(
-                f"cannot reach the controller {self.host}:{PORT}: {exc.strerror or exc}; {_CHECK_ADVICE}"
-            ) from exc
-        self._sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
-            self.close()
-            raise RobotConnectionError(f"{self.host}:{PORT} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
-        return self
+            raise RobotConnectionError(f"{self.host}:{self.port} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the connection; may be called again."""
-        if self._sock is not None:
-            self._sock.close()
-            self._sock = None
+    def split(self, data: bytes) -> tuple[list[bytes], bytes]:
+        """Return the payloads of the data packets at the beginning of what was received, and what is left of it."""
+        packets, rest = rtde.split(data)
+        return [packet.payload for packet in packets if packet.kind is rtde.PacketKind.DATA], rest
 
     def ask_outputs(self, names: Sequence[str], frequency_hz: float = 500.0) -> rtde.Recipe:
         """Ask for variables that the controller sends at a frequency [Hz].
@@ -98,33 +70,13 @@ class RtdeConnection:
         """Let the data flow; from now on nothing waits."""
         if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
             self.close()
-            raise RobotConnectionError(f"{self.host}:{PORT} does not start its RTDE output")
-        if self._sock is not None:
-            self._sock.setblocking(False)
-
-    def fileno(self) -> int:
-        """Return the descriptor, for select and poll; -1 when closed."""
-        return -1 if self._sock is None else self._sock.fileno()
+            raise RobotConnectionError(f"{self.host}:{self.port} does not start its RTDE output")
+        super().prepare()
 
     def read(self) -> list[bytes]:
-        """Return the payloads of the data packets that have arrived, oldest first. Never waits.
-
-        Raises:
-            RobotConnectionError: the controller has closed the connection.
-        """
-        payloads, self._waiting = self._waiting, []
-        if self._sock is None:
-            raise RobotConnectionError(f"the connection to the controller {self.host} is not open")
-        try:
-            data = self._sock.recv(1 << 16)
-        except BlockingIOError:
-            return payloads
-        except OSError as exc:
-            raise RobotConnectionError(f"the controller {self.host} is gone: {exc.strerror or exc}") from exc
-        if not data:
-            raise RobotConnectionError(f"the controller {self.host} has closed the connection")
-        packets, self._rest = rtde.split(self._rest + data)
-        return payloads + [packet.payload for packet in packets if packet.kind is rtde.PacketKind.DATA]
+        """Return the payloads that have arrived, those during the set-up included."""
+        waiting, self._waiting = self._waiting, []
+        return waiting + super().read()
 
     def wait_data(self, timeout: float) -> bytes:
         """Wait for a data packet and return the payload of the newest one.
@@ -175,8 +127,8 @@ class RtdeConnection:
                 data = self._sock.recv(1 << 16)
                 if not data:
                     raise RobotConnectionError(
-                        f"the controller {self.host}:{PORT} has closed the connection during set-up, so perhaps "
-                        f"something else answers there; {_CHECK_ADVICE}"
+                        f"the controller {self.host}:{self.port} has closed the connection during set-up, so perhaps "
+                        f"something else answers there; {self.advice}"
                     )
                 packets, self._rest = rtde.split(self._rest + data)
                 for packet in packets:
@@ -192,11 +144,6 @@ class RtdeConnection:
             if isinstance(exc, RobotConnectionError):
                 raise
             raise RobotConnectionError(
-                f"the controller {self.host}:{PORT} is gone: {exc.strerror or exc}; {_CHECK_ADVICE}"
+                f"the controller {self.host}:{self.port} is gone: {exc.strerror or exc}; {self.advice}"
             ) from exc
         return reply
-
-    def _silent(self) -> RobotTimeout:
-        return RobotTimeout(
-            f"no answer from the controller {self.host}:{PORT} within {self._timeout:g} s; {_CHECK_ADVICE}"
-        )

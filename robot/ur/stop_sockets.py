@@ -25,14 +25,15 @@ from __future__ import annotations
 
 import socket
 import time
-from contextlib import suppress
+from types import MappingProxyType
+from typing import Self
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
+from coneskin.robot.driver.tcp import TcpStops
 from coneskin.robot.driver.values import SetpointProgram, StopPath
 
 from .rtde_connection import RtdeConnection
 
-_REOPEN_TIMEOUT = 0.2  # s for each port; a stop over the other one waits meanwhile
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
 _MAX_ANSWER = 1024  # bytes of a line of the dashboard
 _PROTECTIVE_PROGRAM = """def coneskin_stop():
@@ -53,15 +54,10 @@ _LOCAL_CONTROL = (
     "pendant, then start again"
 )
 _FIRST_X = 10  # major version of PolyScope X
-_STOP_PORTS = {"program": 30003, "command": 29999}  # stop path -> TCP port: script interface, dashboard
 
 
-class StopSockets:
+class StopSockets(TcpStops):
     """Two sockets and the three stops that go through them; open it in a ``with``.
-
-    Args:
-        host: the controller.
-        timeout: how long connecting may take [s].
 
     Raises:
         RobotConnectionError: on entering, where a port does not answer.
@@ -69,63 +65,29 @@ class StopSockets:
             with PolyScope X.
     """
 
+    ports = MappingProxyType({"program": 30003, "command": 29999})  # script interface, dashboard
+    advice = "enable it: Settings, Security, Services"
+
     def __init__(self, host: str, timeout: float = 2.0) -> None:
-        self.host = host
-        self._timeout = timeout
-        self._open_ones: dict[str, socket.socket] = {}
+        super().__init__(host, timeout)
         self._said = b""  # by the dashboard, since its last whole line
 
-    def __enter__(self) -> StopSockets:
-        try:
-            self._refuse_polyscope_x()
-            for name, port in _STOP_PORTS.items():
-                self._open_ones[name] = self._open(port)
-            self._prove_remote(self._open_ones["command"])
-            self._prove_program()
-        except BaseException:
-            self.close()
-            raise
-        return self
+    def __enter__(self) -> Self:
+        self._refuse_polyscope_x()
+        return super().__enter__()
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close both; may be called again."""
-        for sock in self._open_ones.values():
-            sock.close()
-        self._open_ones = {}
-
-    def sockets(self) -> dict[str, socket.socket]:
-        """Return the open sockets, by stop path. The controller sends on both: ``drain`` them."""
-        return dict(self._open_ones)
+    def prove(self) -> None:
+        """Prove that the controller takes commands and programs."""
+        self._prove_remote(self.sockets()["command"])
+        self._prove_program()
 
     def ask(self) -> None:
         """Ask the dashboard whether the controller still takes stops, without waiting; ``drain`` takes its answer."""
-        self._send("command", _MODE_QUESTION)
+        self.send("command", _MODE_QUESTION)
 
-    def drain(self) -> list[tuple[str, socket.socket, str]]:
-        """Take what the controller has sent, at most 64 kB a call and socket, without waiting.
-
-        Returns:
-            the sockets that are no longer of use, for the caller to close, and why: the controller has closed them, or
-            is in local control, or the system could not take a whole program, so that the next one would not be
-            understood.
-        """
-        gone: dict[str, str] = {}
-        for name, sock in self._open_ones.items():
-            try:
-                data = sock.recv(1 << 16)
-            except BlockingIOError:
-                continue
-            except OSError:
-                data = b""
-            if not data:
-                gone[name] = f"the controller has closed the {name} connection, which a stop may need"
-            elif name == "command" and self._is_local(data):
-                gone = dict.fromkeys(self._open_ones, f"the controller {self.host} {_LOCAL_CONTROL}")
-                break
-        return [(name, self._open_ones.pop(name), why) for name, why in gone.items()]
+    def refusal(self, name: str, data: bytes) -> str:
+        """Return that the controller is in local control, where the dashboard has said so."""
+        return f"the controller {self.host} {_LOCAL_CONTROL}" if name == "command" and self._is_local(data) else ""
 
     def _is_local(self, data: bytes) -> bool:
         """Take what the dashboard has said; tell whether that is the answer of local control."""
@@ -199,7 +161,7 @@ class StopSockets:
             whether the system took the bytes; what the arm does is measured, not assumed.
         """
         if path is StopPath.COMMAND:
-            return self._send("command", b"stop\n")
+            return self.send("command", b"stop\n")
         if path is StopPath.SLIDER:
             from .input_writers import set_slider
 
@@ -216,36 +178,4 @@ class StopSockets:
 
     def run(self, program: str) -> bool:
         """Send a program without waiting; it replaces the one that runs. Return whether the system took the bytes."""
-        return self._send("program", program.encode())
-
-    def reopen(self) -> bool:
-        """Open again what has been closed, at most 0.2 s for each; return whether any was opened."""
-        opened = False
-        for name, port in _STOP_PORTS.items():
-            if name not in self._open_ones:
-                with suppress(RobotConnectionError):
-                    self._open_ones[name] = self._open(port, min(self._timeout, _REOPEN_TIMEOUT))
-                    opened = True
-        return opened
-
-    def _send(self, name: str, data: bytes) -> bool:
-        sock = self._open_ones.get(name)
-        try:
-            if sock is None or sock.send(data) == len(data):
-                return sock is not None
-            sock.shutdown(socket.SHUT_RDWR)  # half a program: the next one would not be understood
-        except OSError:
-            pass
-        return False
-
-    def _open(self, port: int, timeout: float | None = None) -> socket.socket:
-        try:
-            sock = socket.create_connection((self.host, port), self._timeout if timeout is None else timeout)
-        except OSError as exc:
-            raise RobotConnectionError(
-                f"cannot reach port {port} of the controller {self.host}, which a stop may need: {exc.strerror or exc}"
-                "; enable it: Settings, Security, Services"
-            ) from exc
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        sock.setblocking(False)
-        return sock
+        return self.send("program", program.encode())

@@ -1,19 +1,16 @@
-"""A controller of another make: a driver and a row, and the guard stops its arm without knowing it."""
+"""A controller of another make: a driver, and the guard stops its arm without knowing it."""
 
 from __future__ import annotations
 
 import json
-import sys
-import types
 from collections.abc import Mapping
 
 import pytest
 
 from coneskin.core.errors import RobotRefused
 from coneskin.core.recording.block import Block
-from coneskin.robot.driver import registry
 from coneskin.robot.driver.messages import StopProgram
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
@@ -22,6 +19,7 @@ from coneskin.robot.sim.mock_arm import CompanionProcesses
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Foam, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
+from tests.robot.arm.test_joint_count import SEVEN
 from tests.support.guard_rig import CONE, START_Q, make_core, touch
 
 
@@ -87,23 +85,35 @@ def test_its_own_connections_take_their_stop_paths_with_them(guarded):
     assert used == {StopPath.COMMAND, StopPath.SLIDER, StopPath.PROTECTIVE}
 
 
-def test_a_row_is_all_that_a_driver_needs(monkeypatch):
-    module = types.ModuleType("another_maker")
-    module.DRIVER = JsonDriver()
-    monkeypatch.setitem(sys.modules, "another_maker", module)
-    monkeypatch.setitem(registry.DRIVERS, "another", "another_maker:DRIVER")
-    assert load_driver("another") is module.DRIVER
+class SevenJointDriver(JsonDriver):
+    """The same of an arm whose seventh joint alone moves."""
+
+    def decode_state(self, time: float, payload: bytes) -> ControllerState:
+        clock, qd = json.loads(payload)
+        return ControllerState(time, clock, (0.1,) * 7, (*(0.0,) * 6, qd), True, False, True)
+
+
+def test_an_arm_of_seven_joints_counts_as_standing_once_its_seventh_does():
+    """Its driver process does not stop it: the guard does, over its own connection, and waits for the seventh joint."""
+    sensor = Sensor(CONE.frustum, 0, name="one")
+    at_once = Imperfections(foam=Foam(delayed=0.0))
+    packets = VirtualSkin([sensor], [touch(0.5, 0.7)], imperfections=at_once, model="ladder").packets()
+    core = make_core([sensor], Reaction(kind="stop"), driver=SevenJointDriver(), model=SEVEN, external=True)
+
+    def payload(now):
+        speed = 0.5 if now < 100.55 else max(0.0, 0.5 - 10.0 * (now - 100.55))
+        return json.dumps([now, speed]).encode()
+
+    out = run(core, payload, 1.8, 100.0, packets)
+    events = {output.name: output for output in out if isinstance(output, GuardEvent)}
+    assert core.phase is Phase.LATCHED
+    assert events[EventName.STANDSTILL].time > 100.6 - 0.01
+    assert next(output.path for output in out if isinstance(output, UseStopPath)) is StopPath.PROGRAM
 
 
 @pytest.mark.parametrize(
-    "row", ["no_such_module:X", "coneskin.robot.ur.driver:NO_SUCH", "coneskin.robot.ur.driver", ""]
+    "path", ["no_such_module:X", "coneskin.robot.ur.driver:NO_SUCH", "coneskin.robot.ur.driver", ""]
 )
-def test_a_row_with_a_mistake_says_which(monkeypatch, row):
-    monkeypatch.setitem(registry.DRIVERS, "another", row)
-    with pytest.raises(RobotRefused, match="of the arm family 'another' cannot be loaded"):
-        load_driver("another")
-
-
-def test_an_unknown_family_lists_the_known_ones():
-    with pytest.raises(RobotRefused, match="no driver for the arm family 'martian'; known: ur"):
-        load_driver("martian")
+def test_a_driver_that_is_not_there_is_one_line(path):
+    with pytest.raises(RobotRefused, match=f"the arm's driver {path!r} cannot be loaded"):
+        load_driver(path)

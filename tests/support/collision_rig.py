@@ -15,6 +15,7 @@ from coneskin.core.recording.block import Block
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.models import UR_CURRENTS
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.values import INTERNAL_PATHS
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
@@ -22,7 +23,7 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
-from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
+from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
@@ -196,7 +197,7 @@ class CollisionRig:
                 place = ContactOnLink(item.link, item.point, item.normal)
                 pushed = push_torque(self._model, tuple(q), place)  # type: ignore[arg-type]
                 torque = [a + item.force * b for a, b in zip(torque, pushed, strict=True)]
-        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
+        return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 
     def _feed(self, kind: BlockKind, payload: bytes = b"") -> None:
         self._take(Block(kind, self.now, payload))

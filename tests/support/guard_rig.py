@@ -9,7 +9,8 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.models import UR_CURRENTS, arm_model
 from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.protocol import ArmDriver
@@ -19,7 +20,7 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
-from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
+from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule
@@ -176,7 +177,7 @@ class GuardRig:
                 place = ContactOnLink(LINK, CONE.point(item.u, item.phi), CONE.normal(item.phi))
                 pushed = push_torque(MODEL, q, place)  # type: ignore[arg-type]
                 torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
-        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
+        return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 
     @property
     def names(self) -> list[str]:
@@ -211,6 +212,7 @@ def make_core(
     driver: ArmDriver = UR_DRIVER,
     speed_limit: SpeedLimit | None = None,
     limits: MonitoringLimits | None = None,
+    model: ArmModel = MODEL,
 ) -> GuardCore:
     """Return a core for sensors that all lie on the same place of the forearm."""
     limits = limits or MonitoringLimits()
@@ -219,6 +221,6 @@ def make_core(
         for s in sensors
     ]
     paths = EXTERNAL_PATHS if external else INTERNAL_PATHS
-    planner = ReactionPlanner(MODEL, 4.0 if external else None, table)
-    arm = ArmSupervisor(MODEL, driver, reaction, limits, paths, rules, planner, speed_limit=speed_limit)
+    planner = ReactionPlanner(model, 4.0 if external else None, table) if model is MODEL else None
+    arm = ArmSupervisor(model, driver, reaction, limits, paths, rules, planner, speed_limit=speed_limit)
     return GuardCore(TouchStream(sensors, DetectorSettings(stuck_frames=200)), placed, limits, arm)

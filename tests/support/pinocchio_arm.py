@@ -29,13 +29,13 @@ def load_pinocchio() -> Any:
 
 @functools.lru_cache
 def pin_arm(arm: ArmModel) -> tuple[Any, Any, list[int]]:
-    """Return a pinocchio model, its data, and the ids of the frames that are the DH frames 0 to 6."""
+    """Return a pinocchio model, its data, and the ids of the frames that are the DH frames, from 0 on."""
     pin = load_pinocchio()
     model = pin.Model()
     parent, placement = 0, pin.SE3.Identity()
     frames = [model.addFrame(pin.Frame("dh0", 0, 0, placement, pin.FrameType.OP_FRAME))]
-    for i in range(6):
-        turned = pin.SE3(pin.utils.rotate("z", arm.theta[i]), np.zeros(3))
+    for i in range(arm.joints):
+        turned = pin.SE3(pin.utils.rotate("z", arm.theta[i] if arm.theta else 0.0), np.zeros(3))
         parent = model.addJoint(parent, pin.JointModelRZ(), placement * turned, f"joint{i + 1}")
         placement = pin.SE3(np.eye(3), np.array([0.0, 0.0, arm.d[i]])) * pin.SE3(
             pin.utils.rotate("x", arm.alpha[i]), np.array([arm.a[i], 0.0, 0.0])
@@ -61,11 +61,11 @@ def pin_rotation(arm: ArmModel, q: list[float], link: int) -> NDArray[np.float64
 
 
 def pin_jacobian(arm: ArmModel, q: list[float], link: int, p_link: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return velocity of the point over angular velocity of the link, in the base frame, shape (6, 6)."""
+    """Return velocity of the point over angular velocity of the link, in the base frame, shape (6, n)."""
     pin = load_pinocchio()
     model, data, frames = pin_arm(arm)
     if link == 0:
-        return np.zeros((6, 6))
+        return np.zeros((6, arm.joints))
     held = model.frames[frames[link]]
     point = pin.SE3(np.eye(3), held.placement.act(np.array(p_link)))
     pin.computeJointJacobians(model, data, np.array(q))

@@ -8,7 +8,8 @@ from collections import deque
 from dataclasses import dataclass
 
 from coneskin.robot.arm.kinematics import place_point
-from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
+from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.reaction.retreat import RetreatPlan, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity
 

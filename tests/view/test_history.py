@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
 from coneskin.view.contact_mark import FADING, ContactLog

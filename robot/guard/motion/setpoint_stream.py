@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.workspace import TablePlane, Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram
@@ -112,7 +112,7 @@ class ReactionPlanner:
         table: TablePlane | None = None,
         bare: BareSides | None = None,
     ) -> None:
-        self.torque = OutsideTorque()
+        self.torque = OutsideTorque(model)
         self._bare = bare
         self._model = model
         self._watchdog_hz = watchdog_hz
@@ -305,9 +305,8 @@ class MotionStream:
         if speed <= most:
             return step
         share = most / speed
-        a, b, c, d, e, f = (share * v for v in step.qd)
         by = (*step.clipped_by, "bare side")
-        return replace(step, qd=(a, b, c, d, e, f), away=share * step.away, clipped_by=by)
+        return replace(step, qd=tuple(share * v for v in step.qd), away=share * step.away, clipped_by=by)
 
     def report(self, now: float, over: Done, out: Outputs) -> str:
         """Report the end of the motion at a host time [s], and return it in words."""
@@ -320,4 +319,4 @@ class MotionStream:
     def end(self, out: Outputs) -> None:
         """Void the setpoints, after a stop has been sent."""
         if self._program is not None:
-            out.append(JointVelocitySetpoint(0, ZERO_VELOCITY, 0.0))
+            out.append(JointVelocitySetpoint(0, (0.0,) * len(self._start), 0.0))

@@ -22,13 +22,6 @@ from coneskin.robot.arm.vectors import dot
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.reaction.types import ContactOnLink
 
-# compiled by mypyc, a Final tuple of floats counts as never set: these three are none
-
-#: N m/A of each joint. Assumed, not measured on an arm
-TORQUE_PER_AMPERE = (12.0, 12.0, 12.0, 9.0, 9.0, 9.0)
-_MIN_UNEXPLAINED = (3.0, 3.0, 3.0, 1.5, 1.5, 1.5)  # N m; of a joint without noise and friction
-#: N m; however large noise and friction are
-MAX_UNEXPLAINED = (24.0, 24.0, 24.0, 9.0, 9.0, 9.0)
 _SPREADS: Final = 3.0  # of what was learned, that count as nothing
 _LEARNING_TIME: Final = 500.0  # states, 1 s
 _RESISTED_SAMPLES: Final = 3  # in a row, 6 ms; a single one may be noise
@@ -38,30 +31,35 @@ _FIT_ROUNDS: Final = 3  # over the touches; they are few, and seldom alike
 class OutsideTorque:
     """Torque from outside on the joints of one arm.
 
+    Args:
+        model: the arm.
+
     Attributes:
-        now: by the newest state [N m]. None where the controller sends no currents.
+        now: by the newest state [N m]. None where the controller sends no currents, or it is not known what they say.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, model: ArmModel) -> None:
         self.now: Joints | None = None
+        self._currents = model.currents
         self._usual: Joints | None = None
-        self._spread: Joints = (0.0,) * 6
+        self._spread: Joints = (0.0,) * model.joints
 
     def feed(self, state: ControllerState, untouched: bool) -> None:
         """Take a measured state. While nothing touches and the arm is free, what it shows is learned."""
-        if state.current is None or state.target_current is None:
+        currents = self._currents
+        if currents is None or state.current is None or state.target_current is None:
             self.now = None
             return
-        both = zip(TORQUE_PER_AMPERE, state.target_current, state.current, strict=True)
-        raw = _six([k * (expected - measured) for k, expected, measured in both])
+        both = zip(currents.torque_per_ampere, state.target_current, state.current, strict=True)
+        raw = tuple([k * (expected - measured) for k, expected, measured in both])
         if self._usual is None:
             self._usual = raw
         usual = self._usual
-        off = self.now = _six([a - b for a, b in zip(raw, usual, strict=True)])
+        off = self.now = tuple([a - b for a, b in zip(raw, usual, strict=True)])
         if untouched:
-            self._usual = _six([a + b / _LEARNING_TIME for a, b in zip(usual, off, strict=True)])
+            self._usual = tuple([a + b / _LEARNING_TIME for a, b in zip(usual, off, strict=True)])
             kept = 1.0 - 1.0 / _LEARNING_TIME
-            self._spread = _six([max(abs(a), kept * b) for a, b in zip(off, self._spread, strict=True)])
+            self._spread = tuple([max(abs(a), kept * b) for a, b in zip(off, self._spread, strict=True)])
 
     @property
     def spread(self) -> Joints:
@@ -71,8 +69,10 @@ class OutsideTorque:
     @property
     def tolerance(self) -> Joints:
         """Torque of each joint that counts as nothing [N m]."""
-        rows = zip(_MIN_UNEXPLAINED, MAX_UNEXPLAINED, self._spread, strict=True)
-        return _six([min(most, least + _SPREADS * spread) for least, most, spread in rows])
+        if (currents := self._currents) is None:
+            return self._spread
+        rows = zip(currents.min_unexplained, currents.max_unexplained, self._spread, strict=True)
+        return tuple([min(most, least + _SPREADS * spread) for least, most, spread in rows])
 
 
 class ResistanceMonitor:
@@ -104,9 +104,9 @@ class ResistanceMonitor:
             if contact.link and contact.location_valid:
                 self._pushes[contact.number] = contact
         left = self._unexplained(q, torque)
-        least = self._least = left if self._least is None else _six(list(map(_nearer_zero, self._least, left)))
+        least = self._least = left if self._least is None else tuple(map(_nearer_zero, self._least, left))
         rises = [abs(a - b) / most for a, b, most in zip(left, least, self._tolerance, strict=True)]
-        worst = max(range(6), key=rises.__getitem__)
+        worst = max(range(len(rises)), key=rises.__getitem__)
         self._beyond = self._beyond + 1 if rises[worst] > 1.0 else 0
         if self._beyond < _RESISTED_SAMPLES:
             return ""
@@ -127,20 +127,15 @@ class ResistanceMonitor:
                 force = max(0.0, force if self._yields else min(force, self._most.setdefault(number, max(0.0, force))))
                 forces[number] = force
                 left = [a - (force - before) * g for a, g in zip(left, push, strict=True)]
-        return _six(left)
+        return tuple(left)
 
 
 def push_torque(model: ArmModel, q: Joints, contact: ContactOnLink) -> Joints:
     """Return the torques on the joints of a push of 1 N on a touch [N m], at joint positions q [rad]."""
     _, normal, columns = place_point(model, q, contact.link, contact.point, contact.normal)
-    return _six([*(-dot(column, normal) for column in columns), *[0.0] * (6 - contact.link)])
+    return (*(-dot(column, normal) for column in columns), *[0.0] * (model.joints - contact.link))
 
 
 def _nearer_zero(a: float, b: float) -> float:
     """Return the smaller of two deviations, 0 where they have changed sides."""
     return 0.0 if a * b < 0.0 else min(a, b, key=abs)
-
-
-def _six(values: Sequence[float]) -> Joints:
-    a, b, c, d, e, f = values
-    return a, b, c, d, e, f

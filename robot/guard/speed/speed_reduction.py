@@ -129,15 +129,12 @@ class SpeedReduction:
     def __init__(self, model: ArmModel, used: bool) -> None:
         self._model = model
         if used:  # here, so that no touch waits for it
-            from coneskin.robot.guard.signals.joint_current import (
-                MAX_UNEXPLAINED,
-                OutsideTorque,
-                ResistanceMonitor,
-            )
+            from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
             from coneskin.robot.reaction.contact_supervision import ContactApproach
 
             self._approach_of, self._torque_of, self._monitor_of = ContactApproach, OutsideTorque, ResistanceMonitor
-            self._tolerance = MAX_UNEXPLAINED  # at any speed and acceleration: none was learned
+            # at any speed and acceleration: none was learned
+            self._tolerance = None if model.currents is None else model.currents.max_unexplained
         self.approach: ContactApproach | None = None
         self._resistance: tuple[OutsideTorque, ResistanceMonitor] | None = None
         self._held = ""  # why the arm counts as held by something
@@ -196,7 +193,7 @@ class SpeedReduction:
         budget = limits.stop_budget(state.speed, reaction.deceleration)
         longest, slow = reaction.time_budget, reaction.slow_speed
         self.now = _ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
-        torque = self._torque_of()
+        torque = self._torque_of(self._model)
         self._resistance = torque, self._monitor_of(self._model, torque, True, self._tolerance)
         self.approach, self._held = approach, ""
         out.append(SetSpeedSlider(self.now.fraction))

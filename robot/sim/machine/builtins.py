@@ -19,7 +19,7 @@ from coneskin.core.errors import KinematicsError
 from coneskin.robot.arm.inertia import arm_inertia, joint_torques, mass_matrix
 from coneskin.robot.arm.inverse_kinematics import nearest, solutions
 from coneskin.robot.arm.kinematics import forward
-from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.value_functions import MAX_LINE, ValueFunctions, written

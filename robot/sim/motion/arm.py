@@ -23,7 +23,8 @@ from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
-from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel
+from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.sim.urscript.values import solve_linear
 
 from .plant import KinematicPlant, PlantState

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from coneskin.robot.arm.kinematics import JOINTS
+from coneskin.robot.arm.models import JOINT_COUNT
 
-_NO_CURRENT = (0.0,) * JOINTS
+_NO_CURRENT = (0.0,) * JOINT_COUNT
 
 
 class PlantLost(Exception):

@@ -14,8 +14,8 @@ import struct
 from collections.abc import Sequence
 
 from coneskin.core.channel import Channel
-from coneskin.robot.arm.kinematics import JOINTS
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.models import JOINT_COUNT
 
 from .arm import CYCLE
 from .plant import PlantLost, PlantState
@@ -60,7 +60,7 @@ class RemotePlant:
     def __init__(self, channel: Channel, q: Sequence[float], model: ArmModel) -> None:
         self._channel = channel
         self._fastest = [_MAX_SPEED_RATIO * speed for speed in model.joint_speed]
-        self._state = PlantState(tuple(q), (0.0,) * JOINTS, (0.0,) * JOINTS)
+        self._state = PlantState(tuple(q), (0.0,) * JOINT_COUNT, (0.0,) * JOINT_COUNT)
         self._behind = 0  # cycles that are not answered yet
 
     def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
@@ -93,9 +93,9 @@ class RemotePlant:
         state = PlantState(values[:6], values[6:12], values[12:])
         ways = [after - before for before, after in zip(self._state.q, state.q, strict=True)]
         for what, own, most, unit in (
-            ("a position", state.q, [_MAX_POSITION] * JOINTS, "rad"),
+            ("a position", state.q, [_MAX_POSITION] * JOINT_COUNT, "rad"),
             ("a speed", state.qd, self._fastest, "rad/s"),
-            ("a current", state.current, [_MAX_CURRENT] * JOINTS, "A"),
+            ("a current", state.current, [_MAX_CURRENT] * JOINT_COUNT, "A"),
             (f"a way in {1e3 * CYCLE:g} ms", ways, [CYCLE * speed for speed in self._fastest], "rad"),
         ):
             for joint, (value, bound) in enumerate(zip(own, most, strict=True), 1):

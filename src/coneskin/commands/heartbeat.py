@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the lines for the scene's arm."""
     from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.registry import load_driver
+    from coneskin.robot.driver.protocol import HeartbeatDriver, load_driver, require
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
             "watchdog already"
         )
     frequency = scene.arm.watchdog_hz
-    print(load_driver(arm_model(scene.arm.model).family).heartbeat_lines(frequency), end="")
+    driver = require(load_driver(arm_model(scene.arm.model).driver), HeartbeatDriver)
+    print(driver.heartbeat_lines(frequency), end="")
     lifetime = f"{1000.0 / frequency:g} ms after the guard's last heartbeat (arm.watchdog_hz)"
     print(f"the program ends {lifetime}", file=sys.stderr)
     return 0

@@ -77,7 +77,7 @@ def withheld_motion(scene: Scene) -> str:
 
 def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.registry import load_driver
+    from coneskin.robot.driver.protocol import HeartbeatDriver, load_driver
     from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.reaction.rules import RuleSet
@@ -88,18 +88,21 @@ def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     if withheld_motion(scene):
         rules = rules.without_motion()  # a mirrored or exchanged skin would retreat into the person
     paths: tuple[StopPath, ...] = INTERNAL_PATHS if scene.arm.control == "internal" else EXTERNAL_PATHS
+    driver = load_driver(arm.driver)
+    own = frozenset({StopPath.DRIVER, StopPath.WATCHDOG}).union(*driver.lost_with.values())
+    paths = tuple(path for path in paths if path in own)
     if not scene.arm.slider_stop:
         paths = tuple(path for path in paths if path is not StopPath.SLIDER)
     planner = _planner(scene, arm, placed) if rules.move else None
     heartbeat = None
-    if scene.arm.control == "external":
+    if scene.arm.control == "external" and isinstance(driver, HeartbeatDriver):
         from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
 
         heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
     limit = None if scene.speed_limit is None else _speed_limit(scene, scene.speed_limit, arm)
     return ArmSupervisor(
         arm,
-        load_driver(arm.family),
+        driver,
         rules.default,
         scene.monitoring_limits,
         paths,

@@ -204,21 +204,29 @@ def _check_together(scene: s.Scene, named: frozenset[str], tables: Mapping[str, 
 def _check_links(scene: s.Scene, problems: list[str]) -> None:
     """Add to problems a link that no arm has, a sensor longer than its link, a joint beyond its limit.
 
-    Lengths and limits need a known arm; names are the same for all arms.
+    Lengths and limits need a known arm.
     """
-    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
-    from coneskin.robot.arm.models import arm_model
+    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index, link_name
+    from coneskin.robot.arm.models import arm_model, is_ur
 
     arm = None if scene.arm is None else arm_model(scene.arm.model)
-    names = {index: name for name, index in LINK_INDEX.items()}
+    own = arm is None or is_ur(arm)
+    last = len(LINK_INDEX) - 1 if arm is None else arm.joints
+    listed = ", ".join(LINK_INDEX) if own else f"base, link_1 to link_{last}"
     for link in scene.links:
         try:
-            name = names[link_index(link.name)]  # "upperarm" and "upper_arm_link" are the same link
+            index = link_index(link.name)  # "upperarm" and "upper_arm_link" are the same link
         except KinematicsError:
-            problems.append(f"link {link.name}: an arm has no such link; it has {', '.join(LINK_INDEX)}")
-            continue
-        if arm is not None and name in TUBE_LENGTHS:
+            index = last + 1
+        if index > last:
+            problems.append(f"link {link.name}: an arm has no such link; it has {listed}")
+        elif arm is not None and not own and (link.frame != "dh" or link.mesh):
+            problems.append(f'link {link.name}: meshes and URDF of the {arm.name} are not known: use frame = "dh"')
+        elif arm is not None and own and (name := link_name(index)) in TUBE_LENGTHS:
             _check_length(link, abs(arm.a[TUBE_LENGTHS[name]]), arm.name, problems)
+    for number, rule in enumerate(scene.rules, 1):
+        if rule.link is not None and rule.link > last:
+            problems.append(f"reaction.rule {number}: the arm has no link_{rule.link}; it has {listed}")
     if arm is not None and scene.motion is not None:
         _check_limits(scene.motion, arm, problems)
 

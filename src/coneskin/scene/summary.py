@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from coneskin.core.errors import RobotRefused
+
 from .tables.source_tables import source_label
 
 if TYPE_CHECKING:
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.sensor import Sensor
 
-    from .values.scene import PlacedSensor, Scene
+    from .values.scene import ArmScene, PlacedSensor, Scene
 
 #: arm.controller_heartbeat -> what it means
 _HEARTBEAT_WORDS = {
@@ -31,7 +33,42 @@ _BARE_WORDS = {
 def missing_parts(scene: Scene) -> list[str]:
     """Return what has to be added before the scene can be guarded, one line each."""
     needed = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
-    return [f"a guard needs a {name}" for name, part in needed.items() if not part]
+    lines = [f"a guard needs a {name}" for name, part in needed.items() if not part]
+    return lines + (_missing_tiers(scene, scene.arm) if scene.arm else [])
+
+
+def _missing_tiers(scene: Scene, arm: ArmScene) -> list[str]:
+    """Return what the scene asks of its arm that the arm's driver cannot; that of UR arms can all."""
+    from coneskin.robot.arm.models import arm_model, is_ur
+
+    model = arm_model(arm.model)
+    if is_ur(model):
+        return []
+    from coneskin.robot.driver.protocol import (
+        HeartbeatDriver,
+        ProgramDriver,
+        SetpointDriver,
+        SliderDriver,
+        load_driver,
+        require,
+    )
+
+    internal, lines = arm.control == "internal", []
+    slows = "slow" in {scene.default_reaction.kind, *(rule.reaction.kind for rule in scene.rules)}
+    wanted = {
+        ProgramDriver: internal,
+        SetpointDriver: scene.moves_away and not internal,
+        SliderDriver: slows or scene.speed_limit is not None,
+        HeartbeatDriver: not internal and arm.controller_heartbeat == "required",
+    }
+    for tier in (tier for tier, needed in wanted.items() if needed):
+        try:
+            require(load_driver(model.driver), tier)
+        except RobotRefused as exc:
+            lines.append(f"{model.name}: {exc}")
+    if scene.moves_away and model.currents is None:
+        lines.append(f'{model.name}: its model has no currents, so nothing may move it away; reaction = "stop" works')
+    return lines
 
 
 def summarize(scene: Scene) -> dict[str, Any]:
@@ -132,11 +169,11 @@ def _reaction(reaction: Reaction) -> str:
 
 
 def _conditions(rule: Rule) -> str:
-    from coneskin.robot.arm.kinematics import LINK_INDEX
+    from coneskin.robot.arm.kinematics import link_name
 
     said = []
     if rule.link is not None:
-        said.append(f"touched on the {next(name for name, index in LINK_INDEX.items() if index == rule.link)}")
+        said.append(f"touched on the {link_name(rule.link)}")
     if rule.level_above is not None:
         said.append(f"level above {rule.level_above:g}")
     if rule.speed_above is not None:

@@ -105,10 +105,10 @@ def _placing(scene: Scene) -> Iterator[str]:
 
 def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     """Compare the sensors of a tube with its axis and its neighbour."""
-    from coneskin.robot.arm.kinematics import LINK_INDEX, MESHED_ARMS, link_index
+    from coneskin.robot.arm.kinematics import MESHED_ARMS, link_index, link_name
     from coneskin.robot.arm.models import arm_model
 
-    name = next(known for known, number in LINK_INDEX.items() if number == link_index(link.name))
+    name = link_name(link_index(link.name))
     if name not in TUBE_LENGTHS:
         return
     arm = arm_model(model)

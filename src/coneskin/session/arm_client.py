@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.errors import KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import ProgramDriver, load_driver, require
 from coneskin.robot.driver.values import Waypoint
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ class ArmClient:
         Raises:
             RobotConnectionError, RobotTimeout: it cannot be opened.
         """
-        return load_driver(self._model.family).variable_reader(self._host).__enter__()
+        return require(load_driver(self._model.driver), ProgramDriver).variable_reader(self._host).__enter__()
 
     @cached_property
     def outputs(self) -> _ArmOutputs:
@@ -188,7 +188,10 @@ class ArmClient:
         Raises:
             RobotConnectionError, RobotTimeout: it cannot be opened.
         """
-        return _ArmOutputs(load_driver(self._model.family).output_writer(self._host).__enter__(), self._requests.check)
+        return _ArmOutputs(
+            require(load_driver(self._model.driver), ProgramDriver).output_writer(self._host).__enter__(),
+            self._requests.check,
+        )
 
     @property
     def connected(self) -> bool:
@@ -212,7 +215,7 @@ class ArmClient:
         Raises:
             Collision: the skin was touched.
             RobotRefused: the guard or the controller does not let the arm move.
-            KinematicsError: q is not six joint positions within the arm's limits.
+            KinematicsError: q is not a joint position for each joint, within the arm's limits.
         """
         self._do(do="move_j", q=self._joints(q), speed=speed, acceleration=acceleration, wait=wait)
 
@@ -274,7 +277,7 @@ class ArmClient:
         """Move the joints at these speeds until the next command, for ``duration`` at most: then the arm is stopped.
 
         Args:
-            qd: six joint speeds [rad/s].
+            qd: joint speeds [rad/s].
             acceleration: of the leading joint [rad/s2].
             duration: for which the speeds hold [s], up to 10; a program that hangs moves the arm no longer than that.
 
@@ -294,7 +297,7 @@ class ArmClient:
         """Follow joint positions [rad], one each control cycle; without a next one for ``duration`` the arm is stopped.
 
         Args:
-            q: six joint positions [rad].
+            q: joint positions [rad].
             duration: for which the position holds [s], up to 10.
             lookahead: time over which the controller smooths the way [s], 0.03 to 0.2.
             gain: with which it follows, 100 to 2000.

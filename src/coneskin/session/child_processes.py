@@ -14,7 +14,7 @@ from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.child_process import spawn
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import LEAVE
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import ProgramDriver, load_driver, require
 from coneskin.skin.sources.kinds import is_simulated
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ class ChildProcesses:
         ours, theirs = pair()
         ends = [theirs]
         if scene.arm is not None and scene.arm.control == "internal":
-            module = load_driver(arm_model(scene.arm.model).family).process
+            module = require(load_driver(arm_model(scene.arm.model).driver), ProgramDriver).process
             self.program = self._start_helper("driver", module, scene, ends)
             self._lifelines.append(self.program)
         elif scene.arm is not None:
@@ -96,7 +96,7 @@ class ChildProcesses:
         self.children[name] = spawn(module, helper_end, theirs)
         channel, limits = Channel(ours), scene.monitoring_limits
         settings = {
-            "family": arm_model(scene.arm.model).family,
+            "driver": arm_model(scene.arm.model).driver,
             "host": scene.arm.host,
             "monitoring": asdict(limits),
             "deceleration": scene.default_reaction.deceleration,

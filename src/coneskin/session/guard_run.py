@@ -109,7 +109,7 @@ def run_guard(
     ports = GuardPorts(session, source, reopen=None if is_simulated(scene.source.kind) else SourceReopening)
     if scene.arm is not None:
         from coneskin.robot.arm.models import arm_model
-        from coneskin.robot.driver.registry import load_driver
+        from coneskin.robot.driver.protocol import HeartbeatDriver, SetpointDriver, SliderDriver, load_driver, require
 
         if scene.arm.control == "internal":
             (ports.driver,) = others
@@ -118,24 +118,24 @@ def run_guard(
         ports.program = ProcessWatch(os.getppid())
         ports.helpers = {name: ProcessWatch(pid) for name, pid in start["helpers"].items()}
         arm, needs = arm_model(scene.arm.model), core.needs
-        driver, host = load_driver(arm.family), scene.arm.host
+        driver, host = load_driver(arm.driver), scene.arm.host
         stack.enter_context(_arm_lock(host))
         driver.check_model(arm, host)
         if needs.setpoints:
-            ports.reader = ports.setpoints = stack.enter_context(driver.setpoint_writer(host))
+            ports.reader = ports.setpoints = stack.enter_context(require(driver, SetpointDriver).setpoint_writer(host))
         else:
             ports.reader = stack.enter_context(driver.state_reader(host))
         ports.stops = stack.enter_context(driver.stop_connections(host))
         if needs.slider:
-            ports.slider = stack.enter_context(driver.speed_slider(host))
+            ports.slider = stack.enter_context(require(driver, SliderDriver).speed_slider(host))
         elif needs.stops_by_slider:
             try:
-                ports.slider = stack.enter_context(driver.speed_slider(host, claim=False))
+                ports.slider = stack.enter_context(require(driver, SliderDriver).speed_slider(host, claim=False))
             except RobotRefused as exc:  # a program has it
                 ports.absent = {"slider": str(exc)}
         if needs.heartbeat is not None:
             try:
-                ports.heartbeat = stack.enter_context(driver.heartbeat_writer(host))
+                ports.heartbeat = stack.enter_context(require(driver, HeartbeatDriver).heartbeat_writer(host))
             except RobotRefused as exc:  # a program has the register
                 if needs.heartbeat:
                     raise

@@ -201,7 +201,7 @@ class History:
 
     def q(self, time: float) -> Joints | None:
         """Return the joint positions at a time [rad]; the first ones before they were measured, None without any."""
-        return self.joints.at(time) or (self.joints.values[0] if self.joints.values else None)  # type: ignore[return-value]
+        return self.joints.at(time) or (self.joints.values[0] if self.joints.values else None)
 
     def level(self, sensor: str, time: float) -> float:
         """Return the touch level of a sensor at a time; 0 before it was read."""
@@ -255,6 +255,6 @@ def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | 
     if scene.arm is None:
         return None
     from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.registry import load_driver
+    from coneskin.robot.driver.protocol import load_driver
 
-    return load_driver(arm_model(scene.arm.model).family).decode_state
+    return load_driver(arm_model(scene.arm.model).driver).decode_state

@@ -26,7 +26,9 @@ def _plots(courses: Sequence[RunCourse]) -> dict[str, list[_Line]]:
         history, whose = course.history, f"run {number}: " if len(courses) > 1 else ""
         lines = [(_LEVELS, name, series, 0) for name, series in history.levels.items()]
         lines += [(_FORCE, "force", history.forces, 0)] if history.forces.times else []
-        lines += [(_SPEEDS, f"joint {k + 1}", history.speeds, k) for k in range(6) if history.speeds.times]
+        lines += [
+            (_SPEEDS, f"joint {k + 1}", history.speeds, k) for k in range(len(next(iter(history.speeds.values), ())))
+        ]
         for sensor, series in history.channels.items():
             lines += [(f"channels of {sensor}", channel, series, k) for k, channel in enumerate(CHANNELS)]
         for what, name, series, column in lines:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from coneskin.robot.arm.kinematics import (
     link_index,
     link_mesh,
     link_motion,
+    link_name,
     link_pose,
     link_poses,
     place_point,
@@ -327,15 +329,22 @@ def test_a_link_may_be_written_as_people_write_it(name: str) -> None:
     assert link_index(name) == 2
 
 
-@pytest.mark.parametrize("name", ["", "elbow", "wrist", "link_2"])
+@pytest.mark.parametrize("name", ["", "elbow", "wrist", "link_7", "link_x", "link_999"])
 def test_an_unknown_link_is_refused_with_the_names_there_are(name: str) -> None:
-    with pytest.raises(KinematicsError, match=r"link must be one of base, shoulder, upper_arm.*wrist_3, got"):
+    with pytest.raises(KinematicsError, match=r"link must be one of base, shoulder, upper_arm.*wrist_3.*, got"):
         dh_link(arm_model("UR5e"), name)
 
 
 def test_an_arm_without_meshes_is_refused() -> None:
     arm = arm_model("UR5e")
-    other = ArmModel("Own", arm.a, arm.d, arm.alpha, arm.joint_lower, arm.joint_upper, arm.joint_speed)
+    other = replace(arm, name="Own")
     with pytest.raises(KinematicsError, match=r"meshes are known for UR3, .*got the arm 'Own'"):
         link_mesh(other, "forearm")
     assert dh_link(other, "forearm") == dh_link(arm, "forearm")
+    with pytest.raises(KinematicsError, match=r"URDF of the arm 'Own' is not known: use frame = .dh."):
+        dh_link(replace(other, driver="another:DRIVER"), "forearm")
+
+
+def test_links_of_any_arm_have_numbers() -> None:
+    assert [link_index(name) for name in ("link_3", "Link 7", "forearm", "link_12")] == [3, 7, 3, 12]
+    assert [link_name(index) for index in (0, 3, 7)] == ["base", "forearm", "link_7"]

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose, link_poses
-from coneskin.robot.arm.model import ZERO_VELOCITY, ArmModel, Joints
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.model import ArmModel, Joints
+from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.arm.workspace import (
     _LIMIT_MARGIN,
     _PART_NAMES,

@@ -9,8 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.arm.workspace import TablePlane, Workspace, skeleton
 from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed

@@ -65,7 +65,7 @@ def test_another_touch_never_makes_it_gentler(listed, default, some, more, speed
 @pytest.mark.parametrize(
     ("condition", "words"),
     [
-        ({"link": 7}, "link must be 0 (base) to 6 (flange), got 7"),
+        ({"link": -1}, "link must be 0 (base) or a link beyond it, got -1"),
         ({"level_above": -0.1}, "level_above must be finite and at least 0, got -0.1"),
         ({"speed_above": math.nan}, "speed_above must be finite and at least 0 rad/s, got nan"),
     ],

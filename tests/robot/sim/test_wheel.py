@@ -13,8 +13,7 @@ import pytest
 
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
-from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.sim.urscript.values import pose_of, values_of
 

@@ -32,6 +32,8 @@ class World:
 
     # driver
 
+    lost_with = UR_DRIVER.lost_with
+
     decode_state = staticmethod(UR_DRIVER.decode_state)
 
     def state_reader(self, host, timeout):

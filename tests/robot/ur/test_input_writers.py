@@ -5,7 +5,7 @@ import time
 import pytest
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.arm.model import ZERO_VELOCITY
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.ur.input_writers import (
     SETPOINT_INPUTS,

@@ -11,9 +11,10 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeou
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.sim.machine.states import SafetyMode
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.ur import rtde_codec, rtde_connection
+from coneskin.robot.ur import rtde_codec
 from coneskin.robot.ur.program_io import _SAFETY_MODES
 from coneskin.robot.ur.rtde_codec import STATE_RECIPE, decode_state
+from coneskin.robot.ur.rtde_connection import RtdeConnection
 from coneskin.robot.ur.state_reader import StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.support.served_controller import served
@@ -185,7 +186,7 @@ class Peer:
 
     def __init__(self, *answers, close=True):
         self.host = free_host()
-        self._server = socket.create_server((self.host, rtde_connection.PORT))
+        self._server = socket.create_server((self.host, RtdeConnection.port))
         self._answers, self._close = answers, close
         self._thread = threading.Thread(target=self._serve)
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.models import UR_CURRENTS
 from coneskin.robot.driver.messages import EndReaction, Release, SetJointVelocity, StatusReport, StopProgram
 from coneskin.robot.driver.values import (
     JointVelocitySetpoint,
@@ -26,7 +27,7 @@ from coneskin.robot.driver.values import (
 )
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE, push_torque
+from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, encode_loss
 from coneskin.robot.reaction.types import ContactOnLink
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
@@ -513,7 +514,7 @@ class GuardWorld:
                 assert at.model is not None
                 pushed = push_torque(at.model, q, ContactOnLink(at.link, *at.place(*_PLACE)))  # type: ignore[arg-type]
                 torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
-        return [-a / b for a, b in zip(torque, TORQUE_PER_AMPERE, strict=True)]
+        return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 
     def _feed_skin(self) -> None:
         wrong = self.wrong

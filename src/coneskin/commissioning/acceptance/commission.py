@@ -15,7 +15,7 @@ from coneskin.core.channel import wait_readable
 from coneskin.core.errors import RobotRefused, RobotTimeout
 from coneskin.core.version import __version__
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.driver.registry import load_driver
+from coneskin.robot.driver.protocol import load_driver
 from coneskin.scene.commissioning_record import CommissioningRecord, fingerprint
 from coneskin.scene.values.scene import Commissioning, Scene
 
@@ -46,11 +46,11 @@ class _ArmWatch:
 
     def __init__(self, arm: ArmScene, stack: ExitStack) -> None:
         model = arm_model(arm.model)
-        self._driver = load_driver(model.family)
+        self._driver = load_driver(model.driver)
         self._driver.check_model(model, arm.host)
         self._reader = stack.enter_context(self._driver.state_reader(arm.host))
         self._heard = 0.0
-        self.q: Joints = (0.0,) * 6
+        self.q: Joints = (0.0,) * model.joints
         end = time.monotonic() + _START_TIMEOUT
         while not self._heard:
             if time.monotonic() > end:

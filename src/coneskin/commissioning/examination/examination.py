@@ -231,15 +231,22 @@ def _latency_timer(source: SourceScene, opened: Source) -> Finding:
 
 def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
     from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.protocol import ExaminationScope
-    from coneskin.robot.driver.registry import load_driver
+    from coneskin.robot.driver.protocol import ExaminationScope, ExaminedDriver, load_driver
 
     internal = arm.control == "internal"
     moves = scene.moves_away and not internal
     slows = "slow" in {scene.default_reaction.kind, *(rule.reaction.kind for rule in scene.rules)}
     scope = ExaminationScope(internal, arm.slider_stop or slows, moves, not internal)
     model = arm_model(arm.model)
-    return load_driver(model.family).examine(model, arm.host, scope)
+    driver = load_driver(model.driver)
+    if isinstance(driver, ExaminedDriver):
+        return driver.examine(model, arm.host, scope)
+    try:
+        driver.check_model(model, arm.host)
+        with driver.stop_connections(arm.host):
+            return [Finding("arm", "ok", f"{model.name} at {arm.host}; it takes stops")]
+    except ConeSkinError as exc:
+        return [Finding("arm", "bad", str(exc), "it is the scene's arm, and takes stops")]
 
 
 def _collect(source: Source, duration: float, clock: Callable[[], float]) -> SkinStatistics:

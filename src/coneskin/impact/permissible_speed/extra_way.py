@@ -25,7 +25,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
-from coneskin.robot.arm.kinematics import JOINTS, link_poses
+from coneskin.robot.arm.kinematics import link_poses
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
@@ -134,7 +134,7 @@ def _levers_and_changes(
     """Return the levers of patches of one link, and how they change with the joints on a ball that the patch touches.
 
     Returns:
-        Levers [m/rad], shape (patches, 6), and changes [m/rad^2], shape (patches, 6, 6), symmetric.
+        Levers [m/rad], shape (patches, joints), and changes [m/rad^2], shape (patches, joints, joints), symmetric.
     """
     import numpy as np
 
@@ -150,7 +150,7 @@ def _levers_and_changes(
     second = np.einsum("pa,iab,pjb->pij", normals, crosses, moved - BODY_RADIUS * tilted)
     mixed = tilted @ moved.swapaxes(1, 2)
     second += mixed + mixed.swapaxes(1, 2)
-    levers, changes = np.zeros((len(patches), JOINTS)), np.zeros((len(patches), JOINTS, JOINTS))
+    levers, changes = np.zeros((len(patches), arm.joints)), np.zeros((len(patches), arm.joints, arm.joints))
     levers[:, :link] = np.einsum("pa,pja->pj", normals, moved)
     changes[:, :link, :link] = np.triu(second) + np.triu(second, 1).swapaxes(1, 2)
     return levers, changes

@@ -35,6 +35,7 @@ from .taylor_integrator import integrate
 from .two_mass_contact import DrivenArm, TwoMassContact
 
 if TYPE_CHECKING:
+    from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.values.scene import Scene
 
     from .arm_patches import ArmPatch
@@ -203,7 +204,7 @@ def map_speeds(
     lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
     assert scene.arm is not None  # or there were no patches
     arm = arm_model(scene.arm.model)
-    everywhere = extra_ways(arm, patches, _any_positions())
+    everywhere = extra_ways(arm, patches, _any_positions(arm))
     extras = everywhere
     lowest: tuple[float, ...] = ()
     highest: tuple[float, ...] = ()
@@ -242,9 +243,9 @@ def map_speeds(
     return SpeedMap(table, tuple(found), tuple(patches), tuple(masses))
 
 
-def _any_positions() -> list[tuple[float, ...]]:
+def _any_positions(arm: ArmModel) -> list[tuple[float, ...]]:
     chance = random.Random(0)
-    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(6)) for _ in range(_POSITION_COUNT)]
+    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(arm.joints)) for _ in range(_POSITION_COUNT)]
 
 
 def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:

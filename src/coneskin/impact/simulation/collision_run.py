@@ -20,7 +20,7 @@ import numpy as np
 
 from coneskin.core.arrays import Floats
 from coneskin.core.recording.block import Block
-from coneskin.robot.arm.kinematics import JOINTS, point_jacobian
+from coneskin.robot.arm.kinematics import point_jacobian
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import Release
@@ -50,7 +50,7 @@ class _ForceLimit:
 
     def __init__(self, model: ArmModel) -> None:
         self._model = model
-        self._torque: Floats = np.zeros(JOINTS)
+        self._torque: Floats = np.zeros(model.joints)
 
     def exceeded(self, q: Sequence[float], torque: Sequence[float], step: float) -> bool:
         """Take the torques from outside [N m] that have acted for a time [s]; tell whether the arm must stop."""
@@ -58,7 +58,7 @@ class _ForceLimit:
         self._torque = share * self._torque + (1.0 - share) * np.asarray(torque, float)
         if not self._torque.any():
             return False
-        return max(self._force(q, JOINTS), self._force(q, _ELBOW_LINK)) > _MAX_FORCE
+        return max(self._force(q, self._model.joints), self._force(q, _ELBOW_LINK)) > _MAX_FORCE
 
     def _force(self, q: Sequence[float], link: int) -> float:
         """Return the force at the end of a link that explains the torques best [N]."""
@@ -150,7 +150,7 @@ class CollisionRun:
         model = arm_model(scene.arm.model)
         padding = scene.padding or Padding()
         self.plant = MujocoPlant(model, sheets_of(scene), bodies, padding, q, period=period, bare=bare)
-        self.arm = MockArm(list(q), [0.0] * 6, heeds=heeds)
+        self.arm = MockArm(list(q), [0.0] * model.joints, heeds=heeds)
         self.meter = ImpactMeter()
         self.events: list[GuardEvent] = []
         self.now = 100.0

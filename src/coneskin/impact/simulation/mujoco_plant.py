@@ -19,7 +19,7 @@ from coneskin.core.errors import MissingExtra
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.guard.signals.joint_current import TORQUE_PER_AMPERE
+from coneskin.robot.arm.models import UR_CURRENTS
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
 from coneskin.skin.virtual.skin import Press
@@ -205,7 +205,7 @@ class MujocoPlant:
     @property
     def currents(self) -> list[float]:
         """Current that each motor takes against the contacts [A]."""
-        return [-torque / each for torque, each in zip(self.external, TORQUE_PER_AMPERE, strict=True)]
+        return [-torque / each for torque, each in zip(self.external, UR_CURRENTS.torque_per_ampere, strict=True)]
 
     @property
     def force(self) -> float:

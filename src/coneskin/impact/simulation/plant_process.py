@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
     try:
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
         plant = ScenePlant(scene, start["q"])
-        plant.update(start["q"], (0.0,) * 6)  # what is loaded on first use is loaded now
+        plant.update(start["q"], (0.0,) * len(start["q"]))  # what is loaded on first use is loaded now
     except (ConeSkinError, PlantLost) as exc:
         program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
         return 1

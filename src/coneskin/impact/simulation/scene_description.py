@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.inertia import ArmInertia, LinkInertia, mass_matrix
-from coneskin.robot.arm.kinematics import JOINTS, cos_sin
+from coneskin.robot.arm.kinematics import cos_sin
 from coneskin.robot.arm.model import ArmModel
 from coneskin.scene.values.scene import BodyScene
 
@@ -25,7 +25,7 @@ SERVO_FREQUENCY = 15.0  #: Hz; of the position loop of a joint, critically dampe
 
 
 def body_link(model: ArmModel, link: int) -> Pose:
-    """Return the pose of a link's DH frame in its MJCF body, 1 (shoulder) to 6."""
+    """Return the pose of a link's DH frame in its MJCF body, 1 (shoulder) to the last."""
     c, s = cos_sin(model.alpha[link - 1])
     turned = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
     return Pose(turned, (model.a[link - 1], 0.0, model.d[link - 1]))
@@ -35,8 +35,9 @@ def _describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]
     """Return the bodies of an arm, nested; ``link1`` is the shoulder, ``joint1`` turns it."""
     opened: list[str] = []
     place = Pose()
-    for link in range(1, JOINTS + 1):
-        c, s = math.cos(model.theta[link - 1]), math.sin(model.theta[link - 1])
+    for link in range(1, model.joints + 1):
+        theta = model.theta[link - 1] if model.theta else 0.0
+        c, s = math.cos(theta), math.sin(theta)
         here = place @ Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
         x, y, _ = zip(*here.rotation, strict=True)
         place = body_link(model, link)
@@ -46,7 +47,7 @@ def _describe_arm(model: ArmModel, inertia: ArmInertia, geoms: Mapping[int, str]
             + _inertial(inertia.links[link - 1], place)
             + geoms.get(link, "")
         )
-    return "\n".join(opened) + "</body>" * JOINTS
+    return "\n".join(opened) + "</body>" * model.joints
 
 
 def _describe_servos(inertia: ArmInertia, masses: Sequence[float]) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
+from coneskin.robot.arm.models import JOINT_COUNT
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
 from coneskin.runs.replay.event_details import QUANTITIES, is_number, is_vector
@@ -103,10 +104,12 @@ def _frames(run: Run, start: float, progress: Progress) -> Iterator[Table]:
 
 
 def _arm(run: Run, start: float) -> Iterator[Table]:
-    joints = {"q": "rad", "qd": "rad_s", "current": "a", "target_current": "a"}
+    first = next(iter(run.states()), None)
+    joints = JOINT_COUNT if first is None else len(first.q)
+    units = {"q": "rad", "qd": "rad_s", "current": "a", "target_current": "a"}
     flags = ("powered", "stopped_by_safety", "program_running")
-    names = [f"{name}{joint}_{unit}" for name, unit in joints.items() for joint in range(1, 7)]
-    unknown = (math.nan,) * 6
+    names = [f"{name}{joint}_{unit}" for name, unit in units.items() for joint in range(1, joints + 1)]
+    unknown = (math.nan,) * joints
     rows = (
         (
             *(state.time - start, state.controller_time, *state.q, *state.qd),

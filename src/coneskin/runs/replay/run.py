@@ -235,17 +235,19 @@ class Run:
 
     def slider(self) -> Iterator[tuple[float, float]]:
         """Yield host times [s] and positions of the speed slider, from 0 to 1; what cannot be read is left out."""
-        if (driver := self._driver()) is not None:
+        from coneskin.robot.driver.protocol import SliderDriver
+
+        if isinstance(driver := self._driver(), SliderDriver):
             for block in self.select(kinds=frozenset({BlockKind.SLIDER})):
                 with suppress(RobotConnectionError):
                     yield block.time, driver.decode_speed_fraction(block.payload)
 
     def _driver(self) -> ArmDriver | None:
         from coneskin.robot.arm.models import arm_model
-        from coneskin.robot.driver.registry import load_driver
+        from coneskin.robot.driver.protocol import load_driver
 
         arm = self.scene().arm
-        return None if arm is None else load_driver(arm_model(arm.model).family)
+        return None if arm is None else load_driver(arm_model(arm.model).driver)
 
     def scene(self, settings: Mapping[str, Any] | None = None) -> Scene:
         """Return the scene of the run. No file that it names is looked for or opened.

@@ -137,11 +137,10 @@ def _draw_speeds(
             axes.axvspan(*gap, color="0.9", label="_")
             axes.text(sum(gap) / 2.0, 0.02, "no states", ha="center", fontsize=7, transform=axes.get_xaxis_transform())
             times.append(gap[0])
-            measured.append([math.nan] * 6)
+            measured.append([math.nan] * len(state.qd))
         times.append(1e3 * (state.time - zero))
         measured.append(state.qd)
-    for joint in range(6):
-        speeds = [qd[joint] for qd in measured]
+    for joint, speeds in enumerate(zip(*measured, strict=True)):
         axes.plot(times, speeds, LINE_DASHES[joint % len(LINE_DASHES)], lw=1.3, label=f"joint {joint + 1}")
     axes.axvline(0.0, color=_TOUCH_COLOR, lw=1.0)
     style = {"transform": axes.get_xaxis_transform(), "fontsize": 8}
@@ -150,7 +149,8 @@ def _draw_speeds(
         axes.axvline(1e3 * (time - zero), color="0.6", lw=0.7, ls=":")
         axes.text(1e3 * (time - zero), 1.01, f" {words}", color="0.3", ha="left", **style)
     axes.set_ylabel("joint speed [rad/s]")
-    axes.legend(ncols=3, loc="best")
+    if measured:
+        axes.legend(ncols=3, loc="best")
 
 
 def _draw_touch(axes: Any, run: Run, scene: Scene, zero: float, window: tuple[float, float]) -> None:
@@ -205,10 +205,10 @@ def _draw_arm(
             axes.scatter(*([value] for value in point), color=_TOUCH_COLOR, s=30, label="touch and normal")
             axes.quiver(*point, *normal, length=0.2, color=_TOUCH_COLOR, lw=1.5)
     axes.set_box_aspect((1, 1, 1), zoom=0.88)  # room for the label of z, which the layout does not know
-    reach = 0.6 * (abs(arm.a[1]) + abs(arm.a[2]))
-    middle = [0.5 * (min(c) + max(c)) for c in zip(*skeleton(arm, touched.q), strict=True)]
-    for centre, setter in zip(middle, (axes.set_xlim, axes.set_ylim, axes.set_zlim), strict=True):
-        setter(centre - reach, centre + reach)
+    spans = [(min(c), max(c)) for c in zip(*skeleton(arm, touched.q), strict=True)]
+    reach = 0.1 + 0.5 * max(high - low for low, high in spans)
+    for (low, high), setter in zip(spans, (axes.set_xlim, axes.set_ylim, axes.set_zlim), strict=True):
+        setter(0.5 * (low + high) - reach, 0.5 * (low + high) + reach)
     axes.set_xlabel("x [m]", labelpad=9.0)
     axes.set_ylabel("y [m]", labelpad=9.0)
     axes.set_zlabel("z [m]", labelpad=6.0)

@@ -27,7 +27,8 @@ MAX_ROWS = 20_000  #: of a table of permissible speeds
 
 ARM_KEYS = with_meanings(
     """
-    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR10e, UR12e, UR15, UR16e, UR18, UR20 or UR30, in any spelling
+    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR10e, UR12e, UR15, UR16e, UR18, UR20 or UR30, in any spelling, or
+        that of an installed package
     host: name or address of the controller
     watchdog_hz: the controller ends the program through which coneskin moves the arm when it receives nothing for 1
         / `watchdog_hz`
@@ -53,7 +54,8 @@ ARM_KEYS = with_meanings(
 )
 LINK_KEYS = with_meanings(
     """
-    name: with an arm: base, shoulder, upper_arm, forearm, wrist_1, wrist_2 or wrist_3. Without one, any name
+    name: with a UR arm: base, shoulder, upper_arm, forearm, wrist_1, wrist_2 or wrist_3. With another: link_1,
+        link_2 and so on. Without one, any name
     frame: what `xyz_mm` and `rpy_deg` refer to: the coordinates of the link's mesh file, the link's frame in the
         arm's URDF, or its DH frame
     mesh: file of the link's mesh. Touched points are then on this mesh instead of the frustum

@@ -4,11 +4,10 @@ import math
 
 import pytest
 
+from coneskin.robot.arm.models import UR_CURRENTS
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.joint_current import (
-    MAX_UNEXPLAINED,
-    TORQUE_PER_AMPERE,
     OutsideTorque,
     ResistanceMonitor,
     push_torque,
@@ -25,7 +24,7 @@ def state(torque, target=ZEROS):
     """A state whose motors hold a torque from outside [N m]."""
     current = None
     if target is not None:
-        current = tuple(a - t / k for a, t, k in zip(target, torque, TORQUE_PER_AMPERE, strict=True))
+        current = tuple(a - t / k for a, t, k in zip(target, torque, UR_CURRENTS.torque_per_ampere, strict=True))
     return ControllerState(0.0, 0.0, Q, ZEROS, True, False, True, current, target)
 
 
@@ -37,7 +36,7 @@ class Monitored:
     """An arm that learns while nothing touches, and is then watched."""
 
     def __init__(self, *usual, yields=False):
-        self.torque = OutsideTorque()
+        self.torque = OutsideTorque(MODEL)
         for torque in usual or [ZEROS]:
             self.torque.feed(state(torque), True)
         self.monitor = ResistanceMonitor(MODEL, self.torque, yields)
@@ -78,9 +77,9 @@ def test_friction_is_learned_before_and_never_excuses_more_than_the_most():
     usual = [one(1, 6.0 * math.sin(0.3 * k)) for k in range(400)]
     arm = Monitored(*usual)
     assert not any(arm.told(ZEROS, *usual[:50]))
-    assert any(arm.told(*[one(1, MAX_UNEXPLAINED[1] + 1.0)] * 5))
+    assert any(arm.told(*[one(1, UR_CURRENTS.max_unexplained[1] + 1.0)] * 5))
     wild = Monitored(*[one(1, 100.0 * math.sin(0.3 * k)) for k in range(400)])
-    assert wild.torque.tolerance == (3.0, MAX_UNEXPLAINED[1], 3.0, 1.5, 1.5, 1.5)
+    assert wild.torque.tolerance == (3.0, UR_CURRENTS.max_unexplained[1], 3.0, 1.5, 1.5, 1.5)
 
 
 def test_a_payload_that_was_set_wrong_is_no_push():

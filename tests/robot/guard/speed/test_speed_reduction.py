@@ -2,8 +2,7 @@
 
 import pytest
 
-from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.driver.values import ControllerState, SetSpeedSlider, StopPath
 from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, SpeedReduction, _ReducedSpeedTouch
 from coneskin.robot.reaction.types import Reaction

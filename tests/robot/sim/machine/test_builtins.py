@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from coneskin.robot.arm.inertia import arm_inertia
-from coneskin.robot.arm.model import ZERO_VELOCITY
-from coneskin.robot.arm.models import arm_model
+from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
