@@ -122,6 +122,7 @@ def _each(action: Callable[[str], int | None], names: tuple[str, ...]) -> int | 
 
 _SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
+_MAX_MADE_UP = 10  # late cycles between two looks at the sockets
 _LOOPBACK_PREFIX = "127."  # of every address that no other computer can reach
 _ACCEPT_BACKLOG = 16  # connections that wait to be accepted
 _MAX_CLIENTS = 50  # of each service
@@ -268,7 +269,9 @@ class Server:
             if wait < -_MAX_LATENESS:
                 before, due = due, time.monotonic()
                 self.controller.hold_up(due - before)  # without it its states would look ever later than they are
-            while due <= time.monotonic():
+            for _ in range(_MAX_MADE_UP):  # clients are read even where a program takes more time than there is
+                if due > time.monotonic():
+                    break
                 self._cycle()
                 due += CYCLE
             self._publish()

@@ -24,8 +24,8 @@ from .script_host import ScriptHost
 from .script_socket import ScriptSocket
 from .socket_functions import RemoteHandle
 
-_MAX_STEPS = 1000  # turns of loops, and calls, of a thread in one cycle: its time slice
-_MAX_TURN_TIME = 0.004  # s of the processor that all threads of a program may use in one cycle
+_MAX_STEPS = 200  # turns of loops, and calls, of a thread in one cycle: its time slice
+_MAX_TURN_TIME = 0.001  # s of the processor that all threads of a program may use in one cycle: half of it
 _MAX_THREADS = 100  # of a program, with those that have ended in this cycle
 
 

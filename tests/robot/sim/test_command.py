@@ -63,6 +63,22 @@ def test_two_arms_run_side_by_side_and_end_with_their_context() -> None:
     assert all(ends(pid) for pid in pids)
 
 
+def test_a_program_that_never_waits_holds_no_client_up() -> None:
+    with (
+        SimulatedController(host=free_host()) as made,
+        socket.create_connection((made.host, PORTS["secondary"]), 60.0) as script,
+    ):
+        script.sendall(b"def p():\n  n = 0\n  while True:\n    n = n + sqrt(n) * 0.5\n  end\nend\n")
+        while made.state()["runtime"] != "PLAYING":
+            pass
+        begin = made.state()["cycle"]
+        while made.state()["cycle"] < begin + 100:  # each answer comes between cycles of that program
+            pass
+        script.sendall(b"def q():\nend\n")
+        while made.state()["program"] == "p":
+            pass
+
+
 def test_it_needs_the_standard_library_alone() -> None:
     """With -S no installed package can be imported, and a program still runs."""
     host = free_host()
