@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
@@ -32,7 +33,7 @@ def event(course: RunCourse, name: str) -> GuardEvent:
 def test_the_arm_stands_where_the_controller_measured_it(course: RunCourse) -> None:
     run = read_run(RUN)
     blocks = list(run.select(kinds=frozenset({BlockKind.ARM})))
-    decode = load_driver("ur").decode_state
+    decode = load_driver(arm_model("UR5e").driver).decode_state
     for block in blocks[:: len(blocks) // 7]:
         assert course.history.q(block.time) == decode(block.time, block.payload).q
     between = 0.5 * (blocks[10].time + blocks[11].time)

@@ -116,4 +116,4 @@ def test_a_sheet_that_was_cut_is_given_no_other_cone(tmp_path: Path) -> None:
     assert merge_sensor_file(same, "sensor 1", tmp_path, problems)["height_mm"] == 200
     assert problems == []
     merge_sensor_file({**same, "radius2_mm": 20}, "sensor 1", tmp_path, problems)
-    assert problems == ["sensor 1: radius2_mm = 20 cannot stand beside file, whose sheet was cut for 41: leave it out"]
+    assert problems == ["sensor 1: radius2_mm = 20 is far from 41, for which the sheet of file was cut: leave it out"]

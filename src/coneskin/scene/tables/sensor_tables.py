@@ -48,13 +48,21 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
     elif name is not None:
         found = _from_file(folder / name, where, problems)
         problems += [
-            f"{where}: {key.name} = {own[key.name]!r} cannot stand beside file, whose sheet was cut for "
-            f"{found[key.name]!r}: leave it out"
+            f"{where}: {key.name} = {own[key.name]} is far from {found[key.name]:.6g}, for which the sheet of file was "
+            "cut: leave it out"
             for key in CONE_KEYS
-            if key.name in own and own[key.name] != found.get(key.name, own[key.name])
+            if _are_far_apart(own.get(key.name), found.get(key.name))
         ]
         return {**found, **own}
     return own
+
+
+_TRIMMED = 0.1  # of a length or an angle by which a person may have cut a sheet otherwise
+
+
+def _are_far_apart(own: Any, cut: Any) -> bool:
+    """Tell whether a value of a scene cannot be that of a sheet which was trimmed by hand."""
+    return all(isinstance(value, int | float) for value in (own, cut)) and abs(own - cut) > _TRIMMED * abs(cut)
 
 
 def _drop_calibration(table: Mapping[str, Any]) -> dict[str, Any]:
