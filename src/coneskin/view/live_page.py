@@ -127,7 +127,7 @@ class LivePage:
             _set(self._levels, level_bars(self._drawn.sheets, moment.levels, moment.force))
             over = ' data-over="1"' if self._run.ended else ""
             told = f'data-sent="{now:.2f}" data-news="{now - self._run.silence:.2f}"{over}'
-            _set(self._clock, f'<div id="coneskin-clock" {told}>{at:9.3f} s</div>')
+            _set(self._clock, f'<div id="coneskin-clock" {told}>{at:.3f} s into the run</div>')
         if now - self._plotted >= _PLOT_PERIOD:
             self._plotted = now
             self._draw_past(course, at)

@@ -19,14 +19,16 @@ _PANEL_STYLE = """
 background:repeating-linear-gradient(45deg,#6b7280 0 8px,#5b616d 8px 16px)}
 .coneskin-old .coneskin-phase::before{content:"\\2715  "}
 .coneskin-old canvas[data-engine],.coneskin-old #coneskin-timeline{filter:grayscale(1) opacity(.35)}
-#coneskin-clock{font:13px monospace}
+#coneskin-clock{font:13px monospace}#coneskin-clock[data-sent]:not(:empty)::before{content:"live, "}
+.coneskin-old #coneskin-clock[data-sent]:not(:empty)::before{content:"old, "}
+.coneskin-over tr[data-row=next]{display:none}
 .coneskin-card{border-left:6px solid #4a0d18;background:#f3f4f6;color:#111827;font-size:12px;padding:4px 8px}
 .coneskin-card th{text-align:left;font-weight:600;padding-right:1em;vertical-align:top;white-space:nowrap}
 .coneskin-title{font-size:13px;word-break:break-all;font-weight:700}#coneskin-levels,#coneskin-legend{font-size:12px}
 #coneskin-events{font:11px/1.5 monospace}
 #coneskin-events>div{padding-left:9ch;text-indent:-9ch;overflow:hidden;overflow-wrap:anywhere;cursor:pointer;
 display:-webkit-box;-webkit-box-orient:vertical;-webkit-line-clamp:3}
-#coneskin-events>div:hover,#coneskin-events>div:focus{display:block}
+#coneskin-events>.now,#coneskin-events>div:hover,#coneskin-events>div:focus{display:block}
 #coneskin-events>.alarm{color:#8f1421}#coneskin-events>.now{font-weight:700}#coneskin-events>.ahead{opacity:.45}
 .coneskin-timeline{position:relative;margin:4px 10px 0;overflow:hidden}#coneskin-timeline{width:100%;display:block}
 .coneskin-cursor,.coneskin-pointer{position:absolute;top:0;bottom:0;width:2px;background:#111827;pointer-events:none}
@@ -63,6 +65,7 @@ _PANEL_SCRIPT = """
     if (clock.dataset.sent) {
       const [guard, server] = silence(clock), over = clock.dataset.over, old = over || guard > 1;
       document.documentElement.classList.toggle('coneskin-old', Boolean(old));
+      document.documentElement.classList.toggle('coneskin-over', Boolean(over));
       all('#root .coneskin-phase').forEach((phase) => put(phase, 'textContent', !old ? phase.dataset.text
         : `was ${phase.dataset.text}${over ? ': the run is over' : `, ${Math.floor(guard)} s ago`}`));
       words = over ? 'the run is over: this is its last moment' : old ? `NOTHING NEW from the ${server > 1

@@ -83,7 +83,7 @@ def _stop_rows(
             sure = "error not told" if told is None else f"+- {max(0.1, 1e3 * math.hypot(*told[0])):.1f} mm (95 %)"
             sure = sure if d["location_valid"] else "not certain"
             place = f"u = {1e3 * d['u']:.1f} mm, phi = {math.degrees(d['phi']):.1f} deg, {sure}"
-            rows += [("touch", f"{d['sensor']} ({d['link']})"), ("place", place), ("level", f"{d['level']:.2f}")]
+            rows += [("touch", f"{d['sensor']} ({d['link']})"), ("place", place), ("level", f"{d['level']:.2f} then")]
         else:
             rows += zip(("cause", "remedy"), _cause_and_remedy(stop.details["why"]), strict=True)
         faults = {
@@ -105,7 +105,9 @@ def _stop_rows(
 
 
 def _card(rows: Sequence[tuple[str, str]]) -> str:
-    lines = "".join(f"<tr><th>{name}</th><td>{escape(_line(text))}</td></tr>" for name, text in rows if text)
+    lines = "".join(
+        f'<tr data-row="{name}"><th>{name}</th><td>{escape(_line(text))}</td></tr>' for name, text in rows if text
+    )
     return f'<div class="coneskin-card"><table>{lines}</table></div>' if lines else ""
 
 
