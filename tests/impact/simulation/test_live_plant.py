@@ -10,13 +10,15 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from coneskin.core.channel import Channel, pair, wait_readable
-from coneskin.core.errors import Collision, MissingExtra, RobotRefused
-from coneskin.robot.guard.signals.journal import BlockKind, EventName, body_places, contact_force
+from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RobotRefused
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, body_places, contact_force
 from coneskin.runs.replay.run import read_run
 from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
@@ -52,8 +54,11 @@ def scene_at(host: str) -> Scene:
     return parse_scene(text + _HAND)
 
 
-@pytest.fixture
-def live() -> Iterator[tuple[Scene, LivePlant, SimulatedController]]:
+Live = tuple[Scene, LivePlant, SimulatedController]
+
+
+@contextmanager
+def opened() -> Iterator[Live]:
     host = free_host()
     scene = scene_at(host)
     with (
@@ -63,13 +68,37 @@ def live() -> Iterator[tuple[Scene, LivePlant, SimulatedController]]:
         yield scene, plant, controller
 
 
-def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+@pytest.fixture
+def live() -> Iterator[Live]:
+    with opened() as parts:
+        yield parts
+
+
+def meet_the_hand(live: Live, recording: Path) -> tuple[list[GuardEvent], dict[str, Any]] | None:
+    """Move into the hand; the events and the state at rest, or None where this computer held up the physics itself."""
     scene, plant, controller = live
-    with guard(scene, recording=tmp_path / "run.rec", pressed_by=plant.skin) as session:
-        with pytest.raises(Collision):
-            session.arm.move_j(GOAL, speed=1.0, acceleration=8.0)
-        events = session.events
-        rest = controller.wait_for_standstill()
+    try:
+        with guard(scene, recording=recording, pressed_by=plant.skin) as session:
+            with pytest.raises(Collision):
+                session.arm.move_j(GOAL, speed=1.0, acceleration=8.0)
+            return session.events, controller.wait_for_standstill()
+    except ConeSkinError:
+        if "behind real time" in controller.state()["plant_lost"]:
+            return None
+        raise
+
+
+def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(tmp_path: Path) -> None:
+    for attempt in range(5):
+        with opened() as live:
+            if (found := meet_the_hand(live, tmp_path / f"{attempt}.rec")) is not None:
+                judge_the_stop(live, tmp_path / f"{attempt}.rec", *found)
+                return
+    pytest.fail("this computer has held the physics up five times of five")
+
+
+def judge_the_stop(live: Live, recording: Path, events: list[GuardEvent], rest: dict[str, Any]) -> None:
+    scene, plant, _ = live
     assert rest["plant_lost"] == ""
     outcome, began = plant.outcome()
     contact, stood = (next(e for e in events if e.name == name) for name in (EventName.CONTACT, EventName.STANDSTILL))
@@ -81,9 +110,9 @@ def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(live, tmp_pat
     assert rest["q"][0] != rest["tcp"][0]
     located = next(e for e in events if e.name == EventName.CONTACT_LOCATED)
     assert located.details["u"] == pytest.approx(0.13, abs=0.01)
-    run = read_run(tmp_path / "run.rec")
+    run = read_run(recording)
     assert run.replay().same
-    (row,) = judge_run(tmp_path / "run.rec")
+    (row,) = judge_run(recording)
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
     truths = list(run.select(kinds=frozenset({BlockKind.TRUTH})))
     felt = [(block.time, force) for block in truths if (force := contact_force(block.payload)) is not None]

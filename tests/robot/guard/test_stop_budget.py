@@ -85,10 +85,11 @@ def stop_of_the_collision() -> Sink:
 @pytest.mark.pure  # compiled calls are not seen by a profiler
 def test_the_way_of_a_stop_keeps_its_budget() -> None:
     sink = stop_of_the_collision()
-    names = [os.path.basename(path).removesuffix(".py") for path in sink.way]
+    way = sink.way[next(k for k, path in enumerate(sink.way) if path != GENERATED) :]  # before, another test's remains
+    names = [os.path.basename(path).removesuffix(".py") for path in way]
     assert names[0] == "core"
-    assert len(set(sink.way)) <= MAX_FILES, " > ".join(names)
-    assert len(sink.way) <= MAX_MOVES, " > ".join(names)
+    assert len(set(way)) <= MAX_FILES, " > ".join(names)
+    assert len(way) <= MAX_MOVES, " > ".join(names)
     assert not set(names) & set(LATER)
     # the stop is the first that comes out; what explains it, and where the touch is, follows in the same call
     assert isinstance(sink[0], StopProgram)
