@@ -100,6 +100,7 @@ def test_the_first_stop_is_out_before_anything_else_and_one_is_enough(world):
     assert world.used[-1][2] == 4.0
 
 
+@pytest.mark.pure
 @pytest.mark.parametrize(("talks", "speed"), [(True, 1.0), (False, None)])
 def test_a_speed_from_before_a_silence_is_not_that_of_the_stop(world, monkeypatch, talks, speed):
     made = []
