@@ -141,17 +141,18 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
         assert process.stdout is not None
         try:
             facts = json.loads(process.stdout.readline())
+            asked = {"RTDE": b"\0\5V\0\2", "interpreter": b"statelastexecuted\n"}  # protocol version 2; a command
             said = {}
             for name, port in facts["ports"].items():
                 with socket.create_connection((facts["host"], port), 5.0) as sock:
-                    sock.sendall(b"\0\5V\0\2" if name == "RTDE" else b"")  # the request for protocol version 2
+                    sock.sendall(asked.get(name, b""))
                     said[name] = sock.recv(4)
         finally:
             process.terminate()
     assert process.returncode == 0
     assert said.pop("RTDE") == b"\0\4V\1"
     assert said.pop("dashboard") == b"Conn"
-    assert set(said) == {"primary", "secondary", "realtime"}
+    assert set(said) == {"primary", "secondary", "realtime", "interpreter"}
     assert all(len(data) == 4 for data in said.values())
 
 

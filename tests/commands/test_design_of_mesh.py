@@ -84,7 +84,9 @@ def test_a_link_of_a_urdf(tmp_path, capsys):
     assert design(f"{tmp_path / 'arm.urdf'}#arm", "-o", str(tmp_path / "out")) == 0
     data = json.loads((tmp_path / "out" / "design.json").read_text())
     cone = data["sheets"][0]["link_cone"]
-    assert sorted([cone["radius1_mm"], cone["radius2_mm"]]) == pytest.approx([80.0, 100.0], abs=0.5)
+    assert sorted([cone["radius1_mm"], cone["radius2_mm"]]) == pytest.approx(
+        [80.0, 100.0], abs=1.0
+    )  # its wires take 14 mm
     assert cone["xyz_mm"][0] == pytest.approx(600.0, abs=0.2)
     assert cone["xyz_mm"][2] == pytest.approx(1100.0, abs=0.2)
     assert data["frame"] == "the URDF link arm"
@@ -136,7 +138,7 @@ def test_a_real_link_with_pictures(tmp_path):
     mesh = DATA / "xarm" / "uf850_link4.stl"
     assert main(["design", str(mesh), "-o", str(tmp_path / "out"), "--max-sheets", "1"]) == 0
     pictures = sorted(path.name for path in (tmp_path / "out" / "pictures").iterdir())
-    kinds = ("deviation", "jig", "layout", "parts", "seam", "stack")
+    kinds = ("deviation", "jig", "layout", "stack")
     assert pictures == ["link.png", *(f"sheet-1-{kind}.png" for kind in kinds)]
     report = (tmp_path / "out" / "report.md").read_text()
     for name in pictures:
