@@ -114,7 +114,7 @@ def place_point(
     """
     frames = _frames(model, q, link)
     x, y, z, origin = frames[-1]
-    p = added(origin, _combined(x, y, z, p_link))
+    p = _combined(x, y, z, p_link, origin)
     columns = [cross(axis, minus(p, o)) for _, _, axis, o in frames[:-1]]
     return PlacedPoint(p, _combined(x, y, z, direction), columns)
 
@@ -184,9 +184,9 @@ def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
     return frames
 
 
-def _combined(x: Vector, y: Vector, z: Vector, by: Vector) -> Vector:
-    a, b, c = by
-    return x[0] * a + y[0] * b + z[0] * c, x[1] * a + y[1] * b + z[1] * c, x[2] * a + y[2] * b + z[2] * c
+def _combined(x: Vector, y: Vector, z: Vector, by: Vector, start: Vector = (0.0, 0.0, 0.0)) -> Vector:
+    (a, b, c), (p, q, r) = by, start
+    return p + x[0] * a + y[0] * b + z[0] * c, q + x[1] * a + y[1] * b + z[1] * c, r + x[2] * a + y[2] * b + z[2] * c
 
 
 def _turned(u: Vector, v: Vector, c: float, s: float) -> tuple[Vector, Vector]:
