@@ -19,6 +19,7 @@ import json
 import math
 import random
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -51,6 +52,8 @@ STANDING = 0.01  # rad/s
 LONGEST = 3.0  # s
 MET = 1.0  # N behind a bare stop, from which on the body was in the arm's way before: such a case is left out
 SETTLED = 2.5  # s after the first contact, in every way alike: a grip that closes later presses a bare stop as well
+AT_REST = 0.8  # s after it, from which on a latched arm at rest among hands at rest has nothing more to show
+REST = 0.1, 0.02, 1e-5  # s in which no force changes by more than this [N], and no joint by more than that [rad]
 
 
 @dataclass(frozen=True)
@@ -201,22 +204,30 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
     forces, depths = [0.0] * parts, [0.0] * parts
     starts = run.plant.places
     stood = False
+    seen = [0.0, *forces, *case.start]  # when, the forces then, and where the joints were
 
     def program(_: object) -> tuple[Joints, float] | None:
         return (case.qd, RUN_UP_ACCELERATION) if any(case.qd) else None
 
     def look() -> bool:
-        nonlocal stood
+        nonlocal stood, seen
         stood = stood or (run.meter.noticed and max(map(abs, run.plant.qd)) < STANDING)
         if not stood:
             return False
+        now = []
         for part, (place, began) in enumerate(zip(run.plant.places, starts, strict=True)):
             mine = [contact for contact in run.plant.contacts if contact.part == part]
-            forces[part] = max(forces[part], sum(contact.force for contact in mine))
+            now.append(sum(contact.force for contact in mine))
+            forces[part] = max(forces[part], now[part])
             for contact in mine:
                 gave = 0.0 if run.plant.parts[part].acts else dot(minus(place, began), contact.normal)
                 depths[part] = max(depths[part], contact.depth + gave)
-        return run.latched and run.now - run.meter.began > SETTLED
+        since, (period, newtons, radians) = run.now - run.meter.began, REST
+        if not run.latched or since < AT_REST or since - seen[0] < period:
+            return run.latched and since > SETTLED
+        before, seen = seen, [since, *now, *run.plant.q]
+        most = [newtons] * parts + [radians] * len(run.plant.q)
+        return all(abs(a - b) < c for a, b, c in zip(seen[1:], before[1:], most, strict=True))
 
     run.run(program, longest=LONGEST, after=LONGEST, look=look)
     moved = run.event(EventName.RETREATED)
@@ -232,8 +243,16 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
 
 
 def measure(seed: int, ways: list[str], bare_side: str, made_by: str) -> list[Row]:
-    rows = [play(seed, way, bare_side)[1] for way in ways]
+    rows: list[Row] = []
+    for way in ways:  # a bare stop first
+        if way == "stop" or not in_the_way(rows[:1]):
+            rows.append(play(seed, way, bare_side)[1])
     return [Row(**{**asdict(row), "commit": made_by}) for row in rows]
+
+
+def in_the_way(stop: Sequence[Row]) -> bool:
+    """Tell whether what is behind the arm presses a bare stop too: it was in the arm's way before it was touched."""
+    return any(row.way == "stop" and row.place != "thumb" and row.forces[1] >= MET for row in stop)
 
 
 def beyond(row: Row, stop: Row) -> tuple[float, float]:
@@ -269,7 +288,7 @@ def main() -> int:
             found.setdefault(row.seed, {})[row.way] = row
     seeds = range(args.first, args.first + args.collisions)
     wanted = {seed: [way for way in WAYS if way not in found.get(seed, {})] for seed in seeds}
-    left = {seed: ways for seed, ways in wanted.items() if ways}
+    left = {seed: ways for seed, ways in wanted.items() if ways and not in_the_way([*found.get(seed, {}).values()])}
     made_by = commit()
     with ProcessPoolExecutor(args.parallel) as pool:
         runs = [pool.submit(measure, seed, ways, args.bare_side, made_by) for seed, ways in left.items()]
@@ -289,7 +308,7 @@ def table(found: dict[int, dict[str, Row]], args: argparse.Namespace) -> int:
     for way in WAYS[1:]:
         for place in (*PLACES, "all"):
             pairs = [(by[way], by["stop"]) for by in found.values() if way in by and place in (by[way].place, "all")]
-            pairs = [(own, stop) for own, stop in pairs if stop.place == "thumb" or stop.forces[1] < MET]
+            pairs = [(own, stop) for own, stop in pairs if not in_the_way([stop])]
             if not pairs:
                 continue
             over = {own.seed: beyond(own, stop) for own, stop in pairs}

@@ -137,6 +137,23 @@ def test_a_person_pushes_with_the_force_wanted_after_the_delay(kind: str) -> Non
     assert [contact.force for contact in arm.contacts] == pytest.approx([30.0] * len(arm.parts), rel=0.02)
 
 
+@pytest.mark.long
+def test_a_hand_caught_between_two_links_presses_with_no_more_than_it_wants_to() -> None:
+    """It once took what it felt at its back for what it pressed with, gave way into it, and so on: 3 kN."""
+    _, normal, _ = leading_side()
+    x, y, z = (-(2 * 0.04 + 2 * 0.0374 + 0.01) * n for n in normal)
+    body = BodyScene("grip", ahead(gap=-0.001).place, (x, y, z), mass=0.6, stiffness=5e3, damping=1.0, force=30.0)
+    inward = link_pose(MODEL, Q, LINK).inverse().rotate(normal)
+    frame, way = CONE.link_frustum, 2.0 * 0.0374 + 2.0 * 0.04 - 0.006
+    a, b, c = (at + way * n for at, n in zip(frame.translation, inward, strict=True))
+    other = SheetOnLink("behind", LINK, PlacedFrustum(CONE.frustum, Pose(frame.rotation, (a, b, c))))
+    arm = MujocoPlant(MODEL, [SHEET, other], [body], SOFT, Q)
+    arm.update(Q, (0.0,) * 6, 1.5)
+    front, back = (next(c.force for c in arm.contacts if (c.sheet, c.part) == (n, 0)) for n in (0, 1))
+    assert front - back == pytest.approx(30.0, rel=0.02)
+    assert front + back == pytest.approx(0.006 * 10e3, rel=0.1)  # what the gap of the two pads makes of it
+
+
 @pytest.mark.parametrize("kind", ["wall", "post"])
 def test_what_does_not_give_way_is_pressed_as_deep_as_the_arm_went(kind: str) -> None:
     _, normal, _ = leading_side()

@@ -26,9 +26,7 @@ from coneskin.skin.virtual.skin import Press
 
 from .scene_description import SheetOnLink, body_link, describe_scene
 
-_FORCE_BAND = (
-    100.0  # N between the force wanted and felt at which a person moves at full speed; faster, hands would hammer
-)
+_FORCE_BAND = 100.0  # N from the force wanted, at which a person moves at full speed; faster, hands would hammer
 
 
 @dataclass
@@ -51,23 +49,27 @@ class _HeldPart:
         """True where a person moves the rest."""
         return self.body.kind in ("person", "grip")
 
-    def update(self, since: float, force: float, away: Vector | None, step: float) -> bool:
+    def update(self, since: float, felt: Sequence[tuple[float, Floats]], step: float) -> bool:
         """Let a person move the rest; return whether it has moved.
+
+        What a hand feels at its back while it gives way, caught between two links, it does not press with: its force
+        counts as one that helps.
 
         Args:
             since: the body was first touched [s]; negative before.
-            force: that this part feels now [N].
-            away: unit vector from the arm to the part where the two touch; None where they do not.
+            felt: what touches this part now: force [N], and unit normal from the arm to the part.
             step: time [s].
         """
         body = self.body
-        if away is not None and body.kind == "person":
-            self._towards = (-away[0], -away[1], -away[2])
+        if felt and body.kind == "person":
+            x, y, z = max(felt, key=lambda touch: touch[0])[1].tolist()
+            self._towards = (-x, -y, -z)
         elif body.kind == "grip" and self._towards == (0.0, 0.0, 0.0):
             x, y, z = body.axis
             self._towards = (-x, -y, -z) if self.part else (x, y, z)
         if not self.acts or since < body.delay:
             return False
+        force = sum(math.copysign(each, -(normal @ self._towards)) for each, normal in felt)
         share = max(-1.0, min(1.0, (body.force - force) / _FORCE_BAND))
         way = share * body.speed * step
         x, y, z = (r + way * t for r, t in zip(self.rest, self._towards, strict=True))
@@ -298,7 +300,7 @@ class MujocoPlant:
         d, step = self._d, self._step
         applied, velocity = d.qfrc_applied, d.qvel
         applied[:] = 0.0
-        felt: dict[int, Touch] = {}
+        felt: dict[int, list[tuple[float, Floats]]] = {}
         for number, (touch, row) in enumerate(near):
             rate, depth = float(row @ velocity), depths[number]
             depths[number] += rate * step
@@ -311,24 +313,21 @@ class MujocoPlant:
             if self._period == 1:
                 self.lost += (force - self._law(touch).elastic(depth)) * rate * step
             self._touched.setdefault(self._body_numbers[touch.part], self.time)
-            if touch.part not in felt or felt[touch.part].force < force:
-                felt[touch.part] = touch._replace(force=force)
+            felt.setdefault(touch.part, []).append((force, touch.normal))
         for number, at in self._moving if self._period == 1 else ():
             x, y, z = velocity[at : at + 3].tolist()
             self.lost += self._damping[number] * (x * x + y * y + z * z) * step
         self._let_people_act(felt)
 
-    def _let_people_act(self, felt: Mapping[int, Touch]) -> None:
-        """Let people move what holds the bodies, for one step, by the firmest touch of each part."""
+    def _let_people_act(self, felt: Mapping[int, Sequence[tuple[float, Floats]]]) -> None:
+        """Let people move what holds the bodies, for one step, by what touches each part."""
         for number, at in self._moving:
             part = self.parts[number]
             if not part.acts:
                 continue
             began = self._touched.get(self._body_numbers[number])
             since = -1.0 if began is None else self.time - began
-            by = felt.get(number)
-            away = None if by is None else tuple(by.normal.tolist())
-            if part.update(since, by.force if by else 0.0, away, self._step):
+            if part.update(since, felt.get(number, ()), self._step):
                 self._m.qpos_spring[at : at + 3] = part.rest
 
     def _find(self, near: float = 0.0) -> list[Touch]:
