@@ -14,7 +14,8 @@ Sources of the table:
     cylinders of the published mass, as in that file. The tensors that it gives for the UR30 are the UR16e's, digit for
     digit, with which an upper arm of 28.5 kg would turn as one of 10; so shoulder and wrists have the UR20's tensors,
     whose masses are the same, and upper arm and forearm the UR20's, scaled by mass and by length squared (ours).
-    The UR7e has the UR5e's, the UR12e the UR10e's. UR15 and UR18 are from commits 2cb0bf1 and 6ffee81.
+    The UR7e has the UR5e's, the UR12e the UR10e's. UR15 and UR18 are from commits 2cb0bf1 and 6ffee81, the UR8 Long
+    from commit 31e2294 of ros-industrial/universal_robot.
     Torques: Universal Robots, "Max. joint torques", as collected in ``joint_limits.yaml`` there.
     Rotors: not published. 0.1 kg m^2 at every joint, as MuJoCo Menagerie's UR5e has it (``universal_robots_ur5e``,
     armature), scaled with the joint's highest torque over 150 N m, because larger joints have larger motors (assumed).
@@ -212,7 +213,7 @@ _UR10E_LINKS: tuple[_Row, ...] = (
     (1.98, (0.0, 0.007, 0.018), (0.00296, -0.00001, 0.0, 0.00222, -0.00024, 0.00258)),
     (0.615, (0.0, 0.0, -0.026), (0.0004, 0.0, 0.0, 0.00041, 0.0, 0.00034)),
 )
-#: of UR15 and UR18, which share them
+#: of UR8 Long, UR15 and UR18, which share them
 _UR15_SHOULDER: _Row = (
     9.9883, (0.000024, -0.033309, 0.025304), (0.051334, 0.000025, -0.000016, 0.047702, 0.008805, 0.034263)
 )  # fmt: skip
@@ -256,6 +257,12 @@ _LINK_TABLE: dict[str, tuple[_Row, ...]] = {
     ),
     "UR5e": _UR5E_LINKS,
     "UR7e": _UR5E_LINKS,
+    "UR8 Long": (
+        _UR15_SHOULDER,
+        (17.0738, (0.565429, -0.000074, 0.19542), (0.056709, 0.000292, -0.054852, 2.44012, -0.000014, 2.432744)),
+        (7.6393, (0.416102, 0.000058, 0.065663), (0.022148, 0.000052, 0.019779, 0.633274, 0.000003, 0.625889)),
+        *_UR15_WRISTS,
+    ),
     "UR10e": _UR10E_LINKS,
     "UR12e": _UR10E_LINKS,
     "UR15": (
@@ -309,6 +316,7 @@ _JOINT_TORQUES = {
     "UR3e": _torque(54.0, 28.0, 9.0),
     "UR5e": _torque(150.0, 150.0, 28.0),
     "UR7e": _torque(150.0, 150.0, 28.0),
+    "UR8 Long": _torque(433.0, 204.0, 70.0),
     "UR10e": _torque(330.0, 150.0, 54.0),
     "UR12e": _torque(330.0, 150.0, 54.0),
     "UR15": _torque(433.0, 204.0, 70.0),

@@ -6,11 +6,10 @@ A package of another maker's arm has an entry point in the group ``coneskin.arms
 Sources:
     Lengths: Universal Robots support article "DH Parameters for calculations of kinematics and dynamics" and
     ``default_kinematics.yaml`` of Universal_Robots_ROS2_Description, which agree digit for digit. The UR7e is a UR5e of
-    higher payload, the UR12e a UR10e: the same geometry and masses. Lengths of UR15 and UR18, and the UR15's limits:
-    ``default_kinematics.yaml`` and ``joint_limits.yaml`` of ros-industrial/universal_robot (commits 499e728, 34b1371).
-    The UR8 Long is missing: no source of its joints' speeds and torques was found. The printed CB3 service manual has
-    other numbers for old series (UR5 series 1 and 2, and UR10 rounded): for those, and for any work below a few
-    millimetres, use ``ArmModel.calibrated``.
+    higher payload, the UR12e a UR10e: the same geometry and masses. Lengths of UR8 Long, UR15 and UR18, and their
+    limits: ``default_kinematics.yaml`` and ``joint_limits.yaml`` of ros-industrial/universal_robot (commits 31e2294,
+    499e728, 34b1371). The printed CB3 service manual has other numbers for old series (UR5 series 1 and 2, and UR10
+    rounded): for those, and for any work below a few millimetres, use ``ArmModel.calibrated``.
     Limits and speeds: user manuals as collected in ``joint_limits.yaml`` there. The elbow's 180 deg is from that file
     too: the controller accepts 360 deg, but the forearm meets the upper arm before. Wrist 3 of UR3 and UR3e turns
     without end. Universal Robots publishes no joint accelerations.
@@ -78,6 +77,7 @@ UR_MODELS = (  # d1, a2, a3, d4, d5, d6 [m]
     _arm("UR3e", (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921), _SMALL_SPEEDS, math.inf),
     _arm("UR5e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
     _arm("UR7e", (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996), _MEDIUM_SPEEDS),
+    _arm("UR8 Long", (0.2186, -0.8989, -0.7149, 0.1824, 0.1361, 0.1434), _FAST_SPEEDS),
     _arm("UR10e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
     _arm("UR12e", (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655), _LARGE_SPEEDS),
     _arm("UR15", (0.2186, -0.6475, -0.5164, 0.1824, 0.1361, 0.1434), _FAST_SPEEDS),
@@ -88,7 +88,7 @@ UR_MODELS = (  # d1, a2, a3, d4, d5, d6 [m]
 )
 
 ENTRY_POINTS = "coneskin.arms"  #: group of the packages
-_MODEL_TABLE = {arm.name.lower(): arm for arm in UR_MODELS}
+_MODEL_TABLE = {arm.name.lower().replace(" ", ""): arm for arm in UR_MODELS}
 #: arms that come with coneskin
 MODEL_NAMES = tuple(arm.name for arm in UR_MODELS)
 

@@ -145,18 +145,8 @@ _CONTROL_MODE_POSITION = 0
 _JOINT_RUNNING, _JOINT_OFF, _JOINT_IDLE = 253, 239, 255  # modes of a joint
 _TOOL_RUNNING = 253  # mode of the tool
 #: size of an arm -> its number as robot type
-_ROBOT_TYPES = {
-    "UR5": 1,
-    "UR7": 1,
-    "UR10": 2,
-    "UR12": 2,
-    "UR3": 3,
-    "UR16": 4,
-    "UR18": 5,
-    "UR20": 7,
-    "UR30": 8,
-    "UR15": 9,
-}
+_ROBOT_TYPES = {"UR5": 1, "UR7": 1, "UR10": 2, "UR12": 2, "UR3": 3, "UR16": 4, "UR18": 5, "UR8 Long": 6}
+_ROBOT_TYPES |= {"UR20": 7, "UR30": 8, "UR15": 9}
 _ROBOT_SUBTYPES = {3: 0, 5: 3}  # major version of the software -> sub-type, as recorded from 5.24
 _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
 _DEFAULT_MOTION = (math.radians(60.0), math.radians(80.0), 0.25, 1.2, 0.25)  # joint and tool v and a, and their radius

@@ -17,6 +17,7 @@ def test_the_whole_family_is_there() -> None:
         "UR3e",
         "UR5e",
         "UR7e",
+        "UR8 Long",
         "UR10e",
         "UR12e",
         "UR15",
@@ -40,7 +41,7 @@ def test_an_unknown_arm_is_refused_with_the_names_there_are(name: str) -> None:
 
 # reach as the data sheets give it [m]
 REACH = {"UR3": 0.5, "UR5": 0.85, "UR10": 1.3, "UR3e": 0.5, "UR5e": 0.85, "UR7e": 0.85, "UR10e": 1.3, "UR16e": 0.9}
-REACH |= {"UR12e": 1.3, "UR15": 1.3, "UR18": 0.95, "UR20": 1.75, "UR30": 1.3}
+REACH |= {"UR8 Long": 1.75, "UR12e": 1.3, "UR15": 1.3, "UR18": 0.95, "UR20": 1.75, "UR30": 1.3}
 
 
 @pytest.mark.parametrize("name", MODEL_NAMES)

@@ -27,8 +27,8 @@ MAX_ROWS = 20_000  #: of a table of permissible speeds
 
 ARM_KEYS = with_meanings(
     """
-    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR10e, UR12e, UR15, UR16e, UR18, UR20 or UR30, in any spelling, or
-        that of an installed package
+    model: UR3, UR5, UR10, UR3e, UR5e, UR7e, UR8 Long, UR10e, UR12e, UR15, UR16e, UR18, UR20 or UR30, in any
+        spelling, or that of an installed package
     host: name or address of the controller
     watchdog_hz: the controller ends the program through which coneskin moves the arm when it receives nothing for 1
         / `watchdog_hz`
