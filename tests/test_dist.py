@@ -6,6 +6,7 @@ is of the environment of the tests (``[dev]``).
 
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -189,3 +190,32 @@ def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
     assert len(complaints) == 1, done.stdout + done.stderr
     assert complaints[0].startswith("program.py:9: error:")
     assert '"str"' in complaints[0]
+
+
+def test_the_simulated_controller_is_a_distribution_of_its_own(tmp_path: Path) -> None:
+    """From a source distribution into an empty environment, where a client and a user's pytest meet it."""
+    run(sys.executable, "-m", "build", "-q", "packaging/sim-ur", cwd=copy(tmp_path / "coneskin"))
+    (found,) = (tmp_path / "coneskin" / "packaging" / "sim-ur" / "dist").glob("*.whl")
+    assert len(found.read_bytes()) < 250_000
+    assert not [name for name, text in contents(found).items() if b"coneskin" in text and "dist-info" not in name]
+    programs = environment(tmp_path / "venv", "--no-index", found)
+    listed = run(sys.executable, "-m", "pip", "--python", programs / "python", "list", "--format", "json", cwd=tmp_path)
+    assert [package["name"] for package in json.loads(listed)] == ["sim-ur"]
+    client = (
+        "import socket, subprocess, sys\n"
+        "from sim_ur import SimulatedController\n"
+        "from sim_ur.robot.sim.process import free_host\n"
+        "with SimulatedController('UR8 Long', free_host()) as controller:\n"
+        "    with socket.create_connection((controller.host, 30004), timeout=5) as rtde:\n"
+        "        rtde.sendall(bytes([0, 5, 86, 0, 2]))\n"
+        "        assert rtde.recv(9) == bytes([0, 4, 86, 1])\n"
+        "    assert controller.state()['safety'] == 'NORMAL'\n"
+        "heavy = {'numpy', 'scipy', 'trimesh', 'rtde_control', 'coneskin'} & set(sys.modules)\n"
+        "print('nothing else' if not heavy else heavy)\n"
+    )
+    assert run(programs / "python", "-c", client, cwd=tmp_path) == "nothing else\n"
+    assert run(programs / "sim-ur", "--help", cwd=tmp_path).startswith("usage: sim-ur")
+    run(sys.executable, "-m", "pip", "--python", programs / "python", "install", "-q", "pytest", cwd=tmp_path)
+    (text,) = re.findall(r'title="test_mine.py"\n(.*?)```', (ROOT / "docs/do/ur-controller.md").read_text(), re.DOTALL)
+    (tmp_path / "test_mine.py").write_text(text)
+    assert "1 passed" in run(programs / "python", "-m", "pytest", "-q", "test_mine.py", cwd=tmp_path)
