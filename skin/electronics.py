@@ -47,10 +47,13 @@ class Electronics:
         input_ohms: resistor from each guide electrode to ground in the other phases [ohm]; it brings an untouched
             guide to 0 V.
         lead_ohms: wire and switch of each electrode [ohm].
-        current_full_scale: drive current that gives the highest count [A].
+        current_full_scale: drive current that gives the highest count [A], counted from a converter's zero.
+        current_zero: what the reading of no drive current stands for [A]; a bias, with which an amplifier's offset of
+            either sign can be read.
 
     Raises:
-        SensorError: a value is not positive, or the supply does not fit into the converter's range.
+        SensorError: a value is not positive, the bias is over a tenth of the full scale, or the supply does not fit
+            into the converter's range.
     """
 
     supply_volts: float = 2.5
@@ -60,11 +63,12 @@ class Electronics:
     input_ohms: float = 10e6
     lead_ohms: LeadOhms = _ONE_OHM
     current_full_scale: float = 0.02
+    current_zero: float = 0.0
 
     def __post_init__(self) -> None:
         units = {"supply_volts": "V", "adc_volts": "V", "current_full_scale": "A"}
         values = {f.name: (getattr(self, f.name), units.get(f.name, "ohm")) for f in fields(self)}
-        del values["adc_bits"], values["lead_ohms"]
+        del values["adc_bits"], values["lead_ohms"], values["current_zero"]
         values |= {f"lead_ohms.{name}": (ohms, "ohm") for name, ohms in self.lead_ohms._asdict().items()}
         for name, (value, unit) in values.items():
             if not (math.isfinite(value) and value > 0.0):
@@ -75,6 +79,11 @@ class Electronics:
             raise SensorError(
                 "electronics.supply_volts must be at most 95 % of adc_volts, or a reading at the positive electrode "
                 f"looks like a short: got {self.supply_volts!r} V of {self.adc_volts!r} V"
+            )
+        if not 0.0 <= self.current_zero <= 0.1 * self.current_full_scale:
+            raise SensorError(
+                "electronics.current_zero must be from 0 A to a tenth of current_full_scale, got "
+                f"{self.current_zero!r} A of {self.current_full_scale!r} A"
             )
         if self.input_ohms < 10.0 * self.pulldown_ohms:
             raise SensorError(
@@ -91,9 +100,9 @@ class Electronics:
         """Return the potential that a count stands for [V]."""
         return count * self.adc_volts / self.full_count
 
-    def amperes(self, count: int) -> float:
+    def amperes(self, count: float) -> float:
         """Return the drive current that a count stands for [A]."""
-        return count * self.current_full_scale / self.full_count
+        return count * self.current_full_scale / self.full_count - self.current_zero
 
     def count_volts(self, volts: float) -> int:
         """Return the count of the converter for a potential [V]: rounded, held within its range."""
@@ -101,7 +110,8 @@ class Electronics:
 
     def count_amperes(self, amperes: float) -> int:
         """Return the count of the converter for a drive current [A]: rounded, held within its range."""
-        return min(max(round(amperes * self.full_count / self.current_full_scale), 0), self.full_count)
+        counts = (amperes + self.current_zero) * self.full_count / self.current_full_scale
+        return min(max(round(counts), 0), self.full_count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +218,7 @@ class GivenElectronics:
     input_ohms: float = 10e6
     lead_ohms: LeadOhms = _ONE_OHM
     current_full_scale: float | None = None
+    current_zero: float = 0.0
 
 
 def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElectronics | None = None) -> Electronics:
@@ -256,6 +267,7 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
         input_ohms=given.input_ohms,
         lead_ohms=leads,
         current_full_scale=full_scale,
+        current_zero=given.current_zero,
     )
 
 

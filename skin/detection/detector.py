@@ -25,7 +25,7 @@ from .frame.faults import Fault
 from .frame.reading import Reading, TouchReading, read
 from .frame.settings import DetectorSettings
 from .frame.timing import FrameTiming
-from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, UntouchedLevel
+from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, UntouchedLevel, UntouchedZero
 from .place.touch_place import TouchPlace
 from .self_test import FrameSelfTest
 
@@ -103,6 +103,7 @@ class Detector:
         self._fed = -math.inf
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
+        self._zero = UntouchedZero(sensor)
         self._diagnosis = FaultDiagnosis(sensor, self._currents)
         self._fault: Fault | None = None
         self._reported: set[Fault | str] = set()  # since it was ready last: each is reported once
@@ -147,8 +148,19 @@ class Detector:
             self._report(events, late, frame, now, self.timing.detail)
             if late is Fault.REPLAYED:
                 return events  # an old frame says nothing about now
+        zero = self._zero
+        resting = frame.touch_c + frame.touch_d < 2.0 * self._release * frame.touch_supply
+        if resting and zero.feed(frame, self.timing.period, not self.ready):
+            self._currents.restart()  # what was learned of them had another zero
+        frame = zero.take_off(frame)
         reading = read(self.sensor, frame, self._inversion, self._currents.noise)
         whole, fault = reading.level, reading.fault
+        if fault is Fault.LEAK and resting and not zero.known:
+            return events  # the first frames tell what no current reads
+        if ((fault is None and resting) or fault is Fault.LEAK) and zero.explains(frame):
+            self._skip()
+            self._report(events, Fault.ZERO, frame, now, zero.excess)
+            return events
         level = whole - self._level.value
         if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
             fault = Fault.GUIDE_DRIVEN
@@ -177,7 +189,8 @@ class Detector:
             if firm and matrix is not None and self._self_test.feed(matrix):
                 self._places.interrupt()
                 detail = f"{self._self_test.deviation(matrix):.1f} times the limit"
-                self._report(events, Fault.GUIDES_DISAGREE, frame, now, detail)
+                low = zero.hidden and self._self_test.lacks_current(matrix)
+                self._report(events, Fault.ZERO if low else Fault.GUIDES_DISAGREE, frame, now, detail)
                 return events
             if self._self_test.doubted:
                 reading = reading._replace(location_valid=False)
@@ -204,6 +217,11 @@ class Detector:
     def fault(self) -> Fault | None:
         """Why the sensor cannot be believed at present. None where it can."""
         return self._fault
+
+    @property
+    def zero(self) -> int:
+        """Counts that are taken off each drive current: the bias and the offset of its amplifier."""
+        return self._zero.counts
 
     @property
     def baseline(self) -> float:

@@ -76,6 +76,10 @@ class FrameSelfTest:
         drawn = matrix.sum_rule**2 / ((_DRAWN_LIMIT * self._drawn(matrix)) ** 2 + self._noise_drawn * noise)
         return math.sqrt(reciprocity + drawn + matrix.split**2 / (_SPLIT_LIMIT**2 + 8.0 * share * share * noise))
 
+    def lacks_current(self, matrix: ContactMatrix) -> bool:
+        """Tell whether the drive current alone contradicts a frame, and is too small."""
+        return self.deviation(matrix._replace(sum_rule=0.0)) < 1.0 and matrix.sum_rule < 0.0
+
     def _drawn(self, matrix: ContactMatrix) -> float:
         """Return the drive current of the touch phase over the supply [S], within the drop in the sheets."""
         return matrix.conductance / (1.0 + 0.5 * self._pulldown * matrix.conductance)

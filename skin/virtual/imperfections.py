@@ -154,6 +154,7 @@ class Imperfections:
         supply_ratio: actual over nominal supply.
         clock_ratio: speed of the device clock over true time.
         current_gain: what each drive current reads over what it is.
+        current_offset: of the amplifier that reads the drive current, as a part of full scale.
         offset_counts: of every reading.
         mains_volts: amplitude of 50 Hz on the guides [V].
         warming: growth of the resistance of the upper and of the lower sheet, as by temperature [1/s].
@@ -171,6 +172,7 @@ class Imperfections:
     supply_ratio: float = 1.0
     clock_ratio: float = 1.0
     current_gain: float = 1.0
+    current_offset: float = 0.0
     offset_counts: float = 0.0
     mains_volts: float = 0.0
     warming: tuple[float, float] = (0.0, 0.0)

@@ -240,10 +240,12 @@ class VirtualSkin:
                 values[name] += left_over * (left - values[name])
         full, counts = parts.full_count, {}
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
+        zero = full * (parts.current_zero / parts.current_full_scale + real.current_offset)
         mains = real.mains_volts * math.sin(_MAINS_RATE * start) if real.mains_volts else 0.0
         for name in self._channels:
             value = values[name] + (mains if name in _GUIDE_NAMES else 0.0)
-            count = value * (ampere * real.current_gain if name in _CURRENT_NAMES else volt) + real.offset_counts
+            current = name in _CURRENT_NAMES
+            count = (value * ampere * real.current_gain + zero if current else value * volt) + real.offset_counts
             if real.noise_counts:
                 count += rng.gauss(0.0, real.noise_counts)
             counts[name] = min(max(round(count), 0), full)

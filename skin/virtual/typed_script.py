@@ -29,7 +29,7 @@ TOUCH_SHAPES: dict[str, Callable[[Frustum, ScriptedTouch], list[ScriptedTouch]]]
 #: Faults that can be typed.
 FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
 #: of the electronics, and of time
-ELECTRIC_FLAWS = frozenset({"current_gain", "offset_counts", "mains_volts", "warming"})
+ELECTRIC_FLAWS = frozenset({"current_gain", "current_offset", "offset_counts", "mains_volts", "warming"})
 FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(ELECTRIC_FLAWS))
 
 

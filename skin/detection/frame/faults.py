@@ -24,6 +24,11 @@ class Fault(Enum):
         "the drive current of the touch phase is not what flows through the pull-downs: an electrode is shorted to "
         "ground or to the supply, an input is stuck, or its gain or that of the current is off"
     )
+    ZERO = (
+        "the drive current does not read its zero where none flows: the offset of its amplifier is too large, "
+        "current_zero_ma of the scene is not the board's, or A or B leaks to ground; where it stays with the sensor "
+        "unplugged it is the board"
+    )
     GUIDES_DISAGREE = (
         "the guides contradict each other or the drive current: an input or a pull-down is broken, its gain is off, "
         "or wires are exchanged"

@@ -136,6 +136,90 @@ def bounded(step: float, most: float) -> float:
     return most if step > most else -most if step < -most else step
 
 
+_ZERO_LIMIT: Final = 0.012  # of full scale, that the zero may be off; 0.8 mV before an amplifier of 50, at 3.3 V
+_ZERO_REST: Final = 1  # count, by which it may be off and is not followed: untouched readings are cut off at 0
+_ZERO_STEP: Final = 1.0  # s, in which it is followed by a count
+
+
+class UntouchedZero:
+    """The count that a drive current reads where none flows: the bias of its amplifier, and the offset.
+
+    An untouched sensor draws no current in the touch phase, so every frame shows it. It is the median of a block:
+    where there is no bias, half of the noise is cut off at 0. It is taken off all three drive currents.
+
+    Args:
+        sensor: the sensor.
+
+    Attributes:
+        counts: what is taken off.
+        known: it has been seen.
+        hidden: the readings have stood at 0, below which they cannot be.
+    """
+
+    def __init__(self, sensor: Sensor) -> None:
+        parts, bounds = sensor.electronics, sensor.bounds
+        self._full = parts.full_count
+        self.nominal = self.counts = round(parts.current_zero / parts.current_full_scale * self._full)
+        self.most = round(_ZERO_LIMIT * self._full)
+        self._per_guide = bounds.touch_current_per_guide
+        self._seen: list[float] = []
+        self._waited = 0.0
+        self._off = 0
+        self.known = self.hidden = False
+
+    def feed(self, frame: Frame, period: float, free: bool) -> bool:
+        """Take a frame, as it came, of a sensor that is not touched. Tell whether another zero was found at once.
+
+        Args:
+            frame: the frame.
+            period: time from frame to frame [s].
+            free: nobody relies on the sensor yet: the zero may be found at once, and need not be followed slowly.
+        """
+        self._seen.append(frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide)
+        if len(self._seen) < CURRENT_BLOCK:
+            return False
+        self.known = True
+        self.hidden = max(self._seen) <= 0.0
+        median = round(sorted(self._seen)[CURRENT_BLOCK // 2])
+        self._seen.clear()
+        self._off = median - self.nominal
+        self._waited += CURRENT_BLOCK * period
+        change = median - self.counts
+        if not -self.most <= self._off <= self.most or -_ZERO_REST <= change <= _ZERO_REST:
+            return False
+        if free:
+            self.counts = median
+            return True
+        if self._waited >= _ZERO_STEP:
+            self._waited = 0.0
+            self.counts += 1 if change > 0 else -1
+        return False
+
+    @property
+    def excess(self) -> str:
+        """By how much the newest block was out of the range that is taken off; empty where it was not, or far more."""
+        if not self.most < abs(self._off) <= 4 * self.most:  # beyond, no amplifier is the cause
+            return ""
+        return f"{100.0 * self._off / self._full:+.2f} % of full scale, at most {100.0 * _ZERO_LIMIT:.1f} %"
+
+    def explains(self, frame: Frame) -> bool:
+        """Tell whether the zero is out of its range, or below 0 as a frame of a touch shows."""
+        lacking = (frame.touch_c + frame.touch_d) * self._per_guide - frame.touch_current
+        return bool(self.excess) or (self.hidden and frame.touch_current > 0 and self.most < lacking < 4 * self.most)
+
+    def take_off(self, frame: Frame) -> Frame:
+        """Return a frame whose drive currents are 0 where none flows; one at full scale stays there."""
+        zero, full = self.counts, self._full
+        if not zero:
+            return frame
+        touch, radial, angular = frame.touch_current, frame.radial_current, frame.angular_current
+        return frame._replace(
+            touch_current=touch - zero if touch < full else full,
+            radial_current=radial - zero if radial < full else full,
+            angular_current=angular - zero if angular < full else full,
+        )
+
+
 _GUIDE_JUMP: Final = (
     0.01  # part of the supply; sudden potential of a guide, or difference of two, that nothing explains
 )

@@ -76,10 +76,12 @@ class SkinWatch:
         """
         count, radial, angular = self._drawn[sensor.device_id, sensor.sensor_id]
         parts = sensor.electronics
-        siemens = parts.current_full_scale / parts.adc_volts / count  # of a current over the supply, both in counts
+        siemens = parts.current_full_scale / parts.adc_volts  # of a current over the supply, both in counts
+        zeros = {detector.sensor.name: detector.zero for detector in self._stream.detectors}
+        zero = zeros[sensor.name] / parts.count_volts(parts.supply_volts)
         a, b, c, d = parts.lead_ohms
-        upper = (1.0 / (radial * siemens) - a - b) * sensor.upper_sheet_ohms / sensor.radial_ohms
-        lower = (1.0 / (angular * siemens) - c - d) * sensor.lower_sheet_ohms / sensor.angular_ohms
+        upper = (1.0 / ((radial / count - zero) * siemens) - a - b) * sensor.upper_sheet_ohms / sensor.radial_ohms
+        lower = (1.0 / ((angular / count - zero) * siemens) - c - d) * sensor.lower_sheet_ohms / sensor.angular_ohms
         return upper, lower
 
     def contradiction(self, sensor: str) -> str:

@@ -18,7 +18,7 @@ from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
-from coneskin.skin.detection.frame.untouched import UntouchedCurrents
+from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedZero
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.wire import Frame, FrameDecoder
 
@@ -162,13 +162,15 @@ def examine_touches(sensor: Sensor, untouched: Sequence[Frame], touched: Sequenc
         period: from frame to frame [s].
     """
     item, rule = f"{sensor.name}, chi-squared", f"at most {_GOOD_PART:g} of the guard's limit"
-    currents = UntouchedCurrents(sensor, DetectorSettings().current_drift)
+    currents, zero = UntouchedCurrents(sensor, DetectorSettings().current_drift), UntouchedZero(sensor)
     for frame in untouched:
-        currents.feed(frame, period)
+        zero.feed(frame, period, free=True)
+    for frame in untouched:
+        currents.feed(zero.take_off(frame), period)
     inversion, test = FrameInversion(sensor), FrameSelfTest(sensor, currents)
     found = []
     for frame in touched:
-        reading = read(sensor, frame, inversion, currents.noise)
+        reading = read(sensor, zero.take_off(frame), inversion, currents.noise)
         if reading.matrix is not None and reading.level >= sensor.thresholds.location_level:
             found.append(test.deviation(reading.matrix) ** 2)
     if len(found) < _MIN_FRAMES:

@@ -213,12 +213,11 @@ def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
 
 def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     parts, found = sensor.electronics, []
-    ampere = parts.current_full_scale / parts.full_count
     for phase, wires, key, design, ohms, sheet in (
         ("radial", "A and B", "upper_sheet_ohm", sensor.radial_amperes, sensor.radial_ohms, sensor.upper_sheet_ohms),
         ("angular", "C and D", "lower_sheet_ohm", sensor.angular_amperes, sensor.angular_ohms, sensor.lower_sheet_ohms),
     ):
-        measured = seen.mean(f"{phase}_current") * ampere
+        measured = parts.amperes(seen.mean(f"{phase}_current"))
         off = max(measured / design, design / measured) if measured > 0.0 else math.inf
         verdict: Verdict = "ok" if off <= _NEAR_FACTOR else "warning" if off <= _FAR_FACTOR else "bad"
         remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"

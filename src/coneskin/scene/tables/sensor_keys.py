@@ -94,6 +94,7 @@ _ELECTRONICS_KEYS = with_meanings(
     input_ohm: from each guide to ground in the other phases; at least 10 times `pulldown_ohm`
     lead_ohm: wire and switch of each electrode: one number for all, or a list for A, B, C, D
     current_full_scale_ma: drive current of the highest count
+    current_zero_ma: drive current that the count of no current stands for, as the board's bias makes it
     """,
     Key("supply_v", float, None, low=0.1, high=50.0, unset=_MATCHED_WORDS),
     Key("adc_v", float, 3.3, low=0.1, high=50.0),
@@ -102,6 +103,7 @@ _ELECTRONICS_KEYS = with_meanings(
     Key("input_ohm", float, 10e6, low=1.0, high=1e12),
     Key("lead_ohm", list, (1.0,) * 4, low=0.0, high=1e6, length=4, above=True, one_for_all=True),
     Key("current_full_scale_ma", float, None, low=1e-3, high=1e4, unset=_MATCHED_WORDS),
+    Key("current_zero_ma", float, 0.0, low=0.0, high=1e3),
 )
 _SHEET_KEYS = with_meanings(
     """

@@ -122,6 +122,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
                     input_ohms=values["input"],
                     lead_ohms=LeadOhms(*values["lead"]),
                     current_full_scale=values["current_full_scale"],
+                    current_zero=values["current_zero"],
                 ),
             ),
             polarity=Polarity(values["radial_positive"], values["angular_positive"]),
@@ -221,6 +222,7 @@ _KEY_NAMES = {
     "pulldown_ohms": "pulldown_ohm",
     "electronics.lead_ohms": "lead_ohm",
     "electronics.current_full_scale": "current_full_scale_ma",
+    "electronics.current_zero": "current_zero_ma",
 }
 
 
