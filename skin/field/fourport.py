@@ -171,19 +171,6 @@ def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0,
     return DrivePhase("angular", guide, guide, Terminal(supply, source, lead), Terminal(0.0, source, lead))
 
 
-def touch_phase(supply: float = 1.0, pull_down: float = 1e5, lead: float = 0.0, source: float = 0.0) -> DrivePhase:
-    """Make the touch phase: A and B at the supply, C and D each pulled down through a resistor and read.
-
-    Args:
-        supply: U0 [V].
-        pull_down: from C and from D to 0 V [ohm].
-        lead: resistance of each lead [ohm].
-        source: internal resistance of each drive [ohm].
-    """
-    drive, guide = Terminal(supply, source, lead), Terminal(0.0, pull_down, lead)
-    return DrivePhase("touch", drive, drive, guide, guide)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
     """The answer of one phase; axes over electrodes run A, B, C, D.

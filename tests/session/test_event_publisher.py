@@ -1,24 +1,32 @@
-"""Published events: what a subscriber in Python, C and JavaScript gets, and what never reaches the guard."""
+"""Published events: what a subscriber in Python, C and JavaScript gets, and what never reaches the guard.
+
+ZeroMQ's own socket and a broker of Debian (mosquitto) take what the others publish.
+"""
 
 import json
 import logging
 import math
+import os
 import shutil
 import socket
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from coneskin.cli import main
-from coneskin.core.errors import SceneError
+from coneskin.core.errors import MissingExtra, SceneError
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+from coneskin.scene.reader import parse_scene
 from coneskin.session.event_log import EventLog
 from coneskin.session.event_publisher import EventPublisher, _event_message
 from tests.support.paths import ROOT
 
-from ..scene.scenes import SKIN_ONLY
+from ..scene.scenes import FULL, SKIN_ONLY
 
 FOLDER = ROOT / "demos" / "subscribers"
 CONTACT = GuardEvent(EventName.CONTACT, 12.5, {"sensor": "skin", "u": 0.1, "phi": math.nan, "normal": (0.0, math.inf)})
@@ -64,6 +72,7 @@ def test_an_event_is_json_that_every_language_reads() -> None:
         **{"t": 2.5, "name": "contact", "sensor": "skin", "u": 0.1},
         **{"phi": None, "normal": [0.0, None]},
     }
+    assert json.loads(_event_message(ENDING, 10.0, "UR5e at 10.0.0.2"))["arm"] == "UR5e at 10.0.0.2"
     long = _event_message(GuardEvent(EventName.MESSAGE, 11.0, {"what": "x" * 10_000}), 10.0)
     assert json.loads(long) == {"t": 1.0, "name": "message", "cut": 10_036}
 
@@ -84,6 +93,9 @@ def test_what_the_network_does_not_take_is_dropped() -> None:
         ("udp://127.0.0.1:door", "an address to publish to is udp://HOST:PORT"),
         ("udp://[::1", "an address to publish to is udp://HOST:PORT"),
         ("udp://127.0.0.1:9870?x", "an address to publish to is udp://HOST:PORT"),
+        ("zmq://127.0.0.1:9870/topic", "an address to publish to is udp://HOST:PORT, zmq://HOST:PORT or mqtt://"),
+        ("mqtt://127.0.0.1:9870/cell/+", "an address to publish to is udp://HOST:PORT"),
+        ("mqtt://192.0.2.7:1883", "192.0.2.7 is not this computer"),
         (f"udp://{64 * 'a'}:9870", "aaa cannot be found: that is no name of a computer"),
         ("udp://192.0.2.7:9870", "192.0.2.7 is not this computer"),
         ("udp://255.255.255.255:9870", "255.255.255.255 is not this computer"),
@@ -129,3 +141,115 @@ def test_every_event_is_logged_and_a_stop_is_a_warning(caplog: pytest.LogCapture
         ("INFO", "activated {}"),
         ("WARNING", "stopping {'why': 'touch'}"),
     ]
+
+
+def test_a_line_of_logging_says_which_arm(caplog: pytest.LogCaptureFixture) -> None:
+    scene = parse_scene(FULL)
+    with caplog.at_level(logging.INFO, "coneskin.events"):
+        EventLog(arm=scene.arm_label).report(EventName.ACTIVATED)
+    assert [record.getMessage() for record in caplog.records] == ["UR5e at 127.0.0.1: activated {}"]
+
+
+def free_port() -> int:
+    with socket.socket() as sock:
+        sock.bind(("127.0.0.1", 0))
+        return int(sock.getsockname()[1])
+
+
+def test_zeromq_carries_the_events_to_whoever_connects() -> None:
+    zmq = pytest.importorskip("zmq", reason="the extra coneskin[zmq] is not installed")
+    port = free_port()
+    publisher = EventPublisher(f"zmq://127.0.0.1:{port}", arm="UR5e at 127.0.0.1")
+    with pytest.raises(SceneError, match=f"cannot publish at tcp://127.0.0.1:{port}: .*; name another port"):
+        EventPublisher(f"zmq://127.0.0.1:{port}")
+    context = zmq.Context()
+    subscriber = context.socket(zmq.SUB)
+    subscriber.rcvtimeo = 50
+    subscriber.subscribe(b"contact")
+    subscriber.connect(f"tcp://127.0.0.1:{port}")
+    try:
+        for _ in range(200):  # what is published before a subscriber is known goes nowhere
+            publisher.publish(CONTACT, 10.0)
+            if subscriber.poll(50):
+                break
+        name, data = subscriber.recv_multipart()
+        assert (name, json.loads(data)["arm"]) == (b"contact", "UR5e at 127.0.0.1")
+        sent = publisher.sent
+        publisher.close()
+        publisher.close()
+        publisher.publish(CONTACT, 10.0)
+        assert (publisher.sent, publisher.dropped) == (sent, 1)
+    finally:
+        context.destroy(linger=0)
+
+
+@pytest.fixture
+def broker() -> Iterator[int]:
+    """Port of a real broker."""
+    pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
+    program = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin:/usr/local/sbin")
+    if program is None:
+        pytest.skip("there is no mosquitto: apt-get install mosquitto")
+    port = free_port()
+    with subprocess.Popen([program, "-p", str(port)], stderr=subprocess.DEVNULL) as process:
+        try:
+            for _ in range(500):
+                with socket.socket() as sock:
+                    if sock.connect_ex(("127.0.0.1", port)) == 0:
+                        break
+                time.sleep(0.02)
+            yield port
+        finally:
+            process.kill()
+
+
+def test_mqtt_carries_the_events_by_a_broker(broker: int) -> None:
+    from paho.mqtt.client import Client
+    from paho.mqtt.enums import CallbackAPIVersion
+
+    got: dict[str, dict[str, object]] = {}
+    ready, done = threading.Event(), threading.Event()
+
+    def take(_client: object, _data: object, message: object) -> None:
+        got[message.topic] = json.loads(message.payload)
+        if message.topic.endswith("ending"):
+            done.set()
+
+    subscriber = Client(CallbackAPIVersion.VERSION2)
+    subscriber.on_subscribe = lambda *_: ready.set()
+    subscriber.on_message = take
+    subscriber.connect("127.0.0.1", broker)
+    subscriber.loop_start()
+    try:
+        subscriber.subscribe("#")
+        assert ready.wait(10.0)
+        publisher = EventPublisher(f"mqtt://127.0.0.1:{broker}/cell/7", arm="UR5e at 127.0.0.1")
+        publisher.publish(CONTACT, 10.0)
+        publisher.publish(ENDING, 10.0)
+        publisher.close()  # what was sent has left
+        publisher.close()
+        publisher.publish(CONTACT, 10.0)
+        assert done.wait(10.0)
+    finally:
+        subscriber.disconnect()
+        subscriber.loop_stop()
+    assert (publisher.sent, publisher.dropped) == (2, 1)
+    assert got["cell/7/contact"]["u"] == 0.1
+    assert got["cell/7/ending"] == {"t": 3.0, "name": "ending", "arm": "UR5e at 127.0.0.1", "what": "told to end"}
+
+
+def test_a_broker_that_is_not_there_is_said_before_anything_is_guarded() -> None:
+    pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
+    port = free_port()
+    with pytest.raises(SceneError, match=f"no MQTT broker takes events at 127.0.0.1:{port}: .*; start one there"):
+        EventPublisher(f"mqtt://127.0.0.1:{port}")
+    assert not [thread for thread in threading.enumerate() if "paho" in thread.name]
+
+
+@pytest.mark.parametrize(("scheme", "module", "extra"), [("zmq", "zmq", "zmq"), ("mqtt", "paho.mqtt.client", "mqtt")])
+def test_a_package_that_is_missing_is_named(
+    scheme: str, module: str, extra: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingExtra, match=rf"pip install 'coneskin\[{extra}\]'"):
+        EventPublisher(f"{scheme}://127.0.0.1:{free_port()}")

@@ -278,9 +278,9 @@ def _print_next(design: LinkDesign, output: Path) -> None:
     alone = f"coneskin init {folder} --simulated --skin-only"
     if design.mesh is None:
         print_hint(f"next: {guarded}")
-    elif unnamed:  # the mesh is not named as a link of a UR arm, and only those are guarded
+    elif unnamed:  # the mesh is not named as a link of a UR arm, and init writes scenes of those only
         print_hint(f"on a UR arm: {guarded}")
         print_hint(f"next: {alone}, which reports touches")
     else:
-        print_hint(f"on another arm than a UR: {alone}, which reports touches; only UR arms are guarded")
+        print_hint(f"on another arm than a UR: {alone}, which reports touches; a package guards it: docs/extend/arm.md")
         print_hint(f"next: {guarded}")

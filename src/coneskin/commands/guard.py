@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     add("--simulated", action="store_true", help="simulate the controller at the scene's host, and the scene's bodies")
-    publish_help = "send each event as JSON to udp://127.0.0.1:PORT; may be repeated"
+    publish_help = "send each event as JSON: udp://, zmq:// or mqtt://127.0.0.1:PORT; may be repeated"
     add("--publish", metavar="URL", action="append", default=[], help=publish_help)
     add("--publish-beyond", action="store_true", help="allow an address of another computer")
     add("--once", action="store_true", help="end after the first collision or fault")
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.session.event_publisher import EventPublisher
 
     with contextlib.ExitStack() as stack:
-        opened = (contextlib.closing(EventPublisher(url, args.publish_beyond)) for url in args.publish)
+        opened = (contextlib.closing(EventPublisher(url, args.publish_beyond, scene.arm_label)) for url in args.publish)
         return _guard(args, scene, [stack.enter_context(publisher) for publisher in opened])
 
 

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         hint = f"; other arms than {address.model}: --arm, none: --skin-only" if address else ""
         raise GeometryError(f"{args.design} makes no scene, and nothing is written{hint}\n{exc}") from exc
     write_whole(args.output, text)
-    arm = f"a {scene.arm.model} at {scene.arm.host}" if scene.arm else "no arm"
+    arm = f"a {scene.arm_label}" if scene.arm else "no arm"
     count = len(scene.sensors)
     print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {scene.links[0].name}, {arm}")
     for finding in suspicions(scene):

@@ -18,6 +18,7 @@ from typing import Any, get_args
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check, with_meanings
+from coneskin.core.toml_text import parse_toml
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
@@ -245,10 +246,10 @@ def read_settings(path: Path | None = None, words: Sequence[str] = ()) -> _Desig
 
 def _tables(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_file(path, MAX_SIZE).decode("utf-8-sig"))
+        return parse_toml(read_file(path, MAX_SIZE).decode("utf-8-sig"))
     except OSError as exc:
         raise GeometryError(f"{path} cannot be read: {exc.strerror or exc}") from exc
-    except (ValueError, RecursionError) as exc:  # not TOML, not UTF-8, or an integer of 5000 digits
+    except ValueError as exc:  # not TOML, or not UTF-8
         raise GeometryError(f"{path} is not TOML: {exc}") from exc
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import KinematicsError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import check
+from coneskin.core.toml_text import parse_toml
 
 from .tables.arm_tables import read_arm, read_bodies, read_monitoring, read_motion, read_padding, read_reaction
 from .tables.keys import COMMISSIONING_KEYS, MAX_SIZE, RECORDING_KEYS
@@ -90,8 +90,8 @@ def parse_scene(
     if any(len(_DOTTED_PART.findall(piece)) > _MAX_PARTS for piece in _PIECE_END.split(text)):
         raise SceneError([f"not TOML: a key must have at most {_MAX_PARTS} parts with dots between them"], name)
     try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as exc:  # a whole number of 5000 digits is a plain ValueError
+        tables = parse_toml(text)
+    except ValueError as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
     named = frozenset(tables)
     problems = [f"unknown table [{t}]; known: {', '.join(TABLES)}" for t in tables if t not in TABLES]

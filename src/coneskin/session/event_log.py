@@ -48,6 +48,7 @@ class EventLog:
         recording: file to record to, or None.
         on_event: called for each event, from a thread of its own.
         limits: of the recording's files; None for one file without a limit.
+        arm: with which each line of logging begins.
 
     Attributes:
         began: when the log was opened, which is the zero of the run's times [s, host clock].
@@ -63,8 +64,10 @@ class EventLog:
         recording: Path | None = None,
         on_event: Callable[[GuardEvent], None] | None = None,
         limits: RecordingScene | None = None,
+        arm: str = "",
     ) -> None:
         self.events: list[GuardEvent] = []
+        self._line_start = f"{arm}: " if arm else ""
         self.began = time.monotonic()
         self.ended = self.activated = self.ending = False
         self.line = _HeardLine()
@@ -168,9 +171,8 @@ class EventLog:
     def _tell(self, events: list[GuardEvent]) -> None:
         """Keep events, and give them to whoever waits for them."""
         for event in events:
-            _EVENT_LOGGER.log(
-                logging.WARNING if event.name in _GRAVE_EVENTS else logging.INFO, "%s %s", event.name, event.details
-            )
+            level = logging.WARNING if event.name in _GRAVE_EVENTS else logging.INFO
+            _EVENT_LOGGER.log(level, "%s%s %s", self._line_start, event.name, event.details)
         names = {event.name for event in events}
         self.activated |= EventName.ACTIVATED in names
         self.ending |= EventName.ENDING in names

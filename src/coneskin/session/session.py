@@ -299,7 +299,8 @@ class Session:
         if self.recording is None and scene.recording is not None:
             self.recording, self._made = new_recording(scene.recording.folder), True
         virtual = scene.source is not None and scene.source.kind == "virtual"
-        self._log = EventLog(self.recording, self._take_event if virtual else self._on_event, scene.recording)
+        heard = self._take_event if virtual else self._on_event
+        self._log = EventLog(self.recording, heard, scene.recording, scene.arm_label)
         self._log.open({**start, "resolved": resolved_settings(scene)} if self.recording is not None else start)
         channel = self._processes.start(scene, start, self._log.note_truth, self.pressed_by)
         if self._processes.skin is not None:

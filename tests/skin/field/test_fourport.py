@@ -11,13 +11,21 @@ import pytest
 
 from coneskin.core.errors import FieldError
 from coneskin.skin.field.disc import Disc
-from coneskin.skin.field.fourport import Coupling, DrivePhase, Terminal, angular_phase, radial_phase, touch_phase
+from coneskin.skin.field.fourport import Coupling, DrivePhase, Terminal, angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel
 from tests.support.field.exact_circuit import exact_volts
 
 from ..field_cases import PAPER
 
 MODEL = FieldModel(PAPER, 100.0, 300.0)
+
+
+def touch_phase(supply: float = 1.0, pull_down: float = 1e5, lead: float = 0.0, source: float = 0.0) -> DrivePhase:
+    """A and B at the supply [V], C and D each pulled down through a resistor [ohm] and read."""
+    drive, guide = Terminal(supply, source, lead), Terminal(0.0, pull_down, lead)
+    return DrivePhase("touch", drive, drive, guide, guide)
+
+
 PLACES = (np.array([0.02, 0.05, 0.08]), np.array([0.3, 0.9, 1.2]))
 
 

@@ -8,7 +8,6 @@ in docs/do/permissible-speed.md.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
+from coneskin.core.toml_text import parse_toml
 from coneskin.robot.arm.kinematics import link_index
 from coneskin.scene.tables.keys import MAX_SIZE
 
@@ -134,8 +134,8 @@ def _parse_limits(text: str, name: str = "limits") -> LimitsFile:
         SceneError: with every mistake.
     """
     try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as exc:
+        tables = parse_toml(text)
+    except ValueError as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
     problems = [f"unknown table [{table}]; known: limits, measured" for table in tables if table not in _TABLE_KEYS]
     for table, what in _TABLE_KEYS.items():

@@ -6,6 +6,7 @@ has a mistake.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.materials import Padding
 
+_HOST_AND_MORE = re.compile(r"/|^[^:]*:[^:]*$")  # a scheme, a path, or a port; an IPv6 address has two colons or more
 _WAYPOINT_KEYS = (replace(k.MOTION_KEYS[0], name="q_deg"),)
 _RULE_CONDITIONS = ("link", "level_above", "speed_above")  # of a rule
 #: keys that a kind must have, because nothing is known that holds for all
@@ -50,6 +52,10 @@ def read_arm(tables: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
             del values["model"]
     if not values.get("host", "?").strip():
         problems.append("arm.host must name the controller, got an empty text")
+    elif _HOST_AND_MORE.search(host := values.get("host", "").strip()):
+        alone = host.rpartition("://")[2].partition("/")[0].partition(":")[0]
+        remedy = f'write "{alone}": the ports are those of the arm\'s model'
+        problems.append(f"arm.host must be a name or address, without scheme, port or path, got {host!r}; {remedy}")
     if len(values) < len(k.ARM_KEYS):
         return None
     del values["speed_limit_from"]  # the table stands in place of it

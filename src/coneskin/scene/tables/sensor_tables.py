@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import ConeSkinError, GeometryError, SensorError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
+from coneskin.core.toml_text import parse_toml
 from coneskin.scene.values.scene import LinkScene, PlacedSensor
 
 from .keys import LINK_KEYS, MAX_SIZE
@@ -206,10 +206,10 @@ def _touch_level(table: Mapping[str, Any], values: Mapping[str, Any], forces: Fo
 
 def _from_file(path: Path, where: str, problems: list[str]) -> dict[str, Any]:
     try:
-        return tomllib.loads(read_file(path, MAX_SIZE).decode("utf-8-sig"))
+        return parse_toml(read_file(path, MAX_SIZE).decode("utf-8-sig"))
     except OSError as exc:
         problems.append(f"{where}.file: {path} cannot be read: {exc.strerror or exc}")
-    except (ValueError, RecursionError) as exc:  # not TOML, not UTF-8, or an integer of 5000 digits
+    except ValueError as exc:  # not TOML, or not UTF-8
         problems.append(f"{where}.file: {path} is not TOML: {exc}")
     return {}
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict
 from itertools import pairwise
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
+from coneskin.core.toml_text import parse_toml
 from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, facts_digest
 
 from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
@@ -82,11 +82,11 @@ def inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: li
 
 def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
     try:
-        found = tomllib.loads(read_file(path, _MAX_BYTES).decode("utf-8-sig"))
+        found = parse_toml(read_file(path, _MAX_BYTES).decode("utf-8-sig"))
     except OSError as exc:
         problems.append(f"arm.speed_limit_from: {path} cannot be read: {exc.strerror or exc}; {_HOW_TO}")
         return
-    except (ValueError, RecursionError) as exc:
+    except ValueError as exc:
         problems.append(f"arm.speed_limit_from: {path} is not TOML: {exc}")
         return
     if set(found) != {"speed_limit"} or not isinstance(found["speed_limit"], dict):

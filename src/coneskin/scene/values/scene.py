@@ -308,6 +308,11 @@ class Scene:
         return tuple(sensor for link in self.links for sensor in link.sensors)
 
     @property
+    def arm_label(self) -> str:
+        """The arm as log lines name it, such as ``UR5e at 10.0.0.2``; empty where there is none."""
+        return f"{self.arm.model} at {self.arm.host}" if self.arm else ""
+
+    @property
     def default_reaction(self) -> Reaction:
         """Reaction to a touch that no rule fits; a stop where the file names none."""
         from coneskin.robot.reaction.types import Reaction
