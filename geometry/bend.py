@@ -13,11 +13,8 @@ and cones alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
-
-from coneskin.core.errors import GeometryError
 
 from .frustum import sinc
 from .pose import Vector
@@ -25,9 +22,6 @@ from .pose import Vector
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-_WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
-_MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,49 +35,6 @@ class Bend:
 
     width: float
     turn: float
-
-
-def check_bends(bends: Sequence[Bend], wrap: float) -> None:
-    """Check that bends are possible and add up to a wrap [rad].
-
-    Raises:
-        GeometryError: a bend is not finite or turns too far, or they do not add up.
-    """
-    for bend in bends:
-        if not (math.isfinite(bend.width) and bend.width > 0.0 and math.isfinite(bend.turn)):
-            raise GeometryError(f"a bend needs a width above 0 rad and a finite turn, got {bend}")
-        if abs(bend.turn) > math.tau:
-            raise GeometryError(f"a bend turns by a full turn (2 pi rad) at most, got {bend.turn!r} rad")
-    width = math.fsum(bend.width for bend in bends)
-    if abs(width - wrap) > _WRAP_ROUNDING:
-        raise GeometryError(
-            f"the widths of the bends must add up to the wrap of {math.degrees(wrap):.6g} deg, they are "
-            f"{math.degrees(width):.6g} deg"
-        )
-
-
-def bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool = False) -> tuple[Bend, ...]:
-    """Return the bends between two azimuths [rad], those at the edges cut.
-
-    Args:
-        bends: from phi = 0 on.
-        phi1: first azimuth, not below 0.
-        phi2: last azimuth.
-        around: True where the first bend follows the last one again; else the last one goes on.
-    """
-    parts, begin = [], 0.0
-    wrap = math.fsum(bend.width for bend in bends)
-    beyond = phi2 - wrap
-    if around:
-        bends = tuple(bends) * max(1, math.ceil(phi2 / wrap - _MIN_BEND_WIDTH))
-    elif beyond > _MIN_BEND_WIDTH:
-        bends = (*bends, Bend(beyond, bends[-1].turn * beyond / bends[-1].width))
-    for bend in bends:
-        low, high = max(begin, phi1), min(begin + bend.width, phi2)
-        if high - low > _MIN_BEND_WIDTH:
-            parts.append(Bend(high - low, bend.turn * (high - low) / bend.width))
-        begin += bend.width
-    return tuple(parts)
 
 
 _STRAIGHT_TURN = 1e-9  # rad; a strip that turns by less has its nearest foot by the formula of a plane
@@ -163,26 +114,3 @@ class BentStrip:
         out = k * first * to_t - k * g * second * to_u + (1.0 - k * k * second) * to_n
         across = np.cos(angle) * to_t - first * (g * to_u + k * to_n)
         return along, np.hypot(out, across)
-
-
-def frames_along(
-    strips: Sequence[BentStrip], number: NDArray[np.int64], along: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return points of end 1 [m], rulings and normals for many places: shapes (..., 3).
-
-    Args:
-        strips: of a side.
-        number: of the strip of each place, shape (...).
-        along: distance of each place from the first ruling of its strip [m], shape (...).
-    """
-    import numpy as np
-
-    at, t, u, n = (np.array([getattr(strip.first, name) for strip in strips])[number] for name in ("at", "t", "u", "n"))
-    g = np.array([strip.g for strip in strips])[number][..., None]
-    k = np.array([strip.k for strip in strips])[number][..., None]
-    along = along[..., None]
-    angle = np.hypot(g, k) * along
-    first = along * np.sinc(angle / np.pi)
-    second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
-    step = first * t - second * (k * n + g * u)
-    return at + step, u + g * step, n + k * step

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import bisect
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import GeometryError
 
-from .bend import Bend, BentStrip, RulingFrame, bends_between, check_bends, frames_along
+from .bend import Bend, BentStrip, RulingFrame
 from .frustum import Frustum
 from .placed_frustum import PlacedFrustum
 from .pose import Pose, Vector
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+_WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
+_MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
 _AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
 _NORMAL_COUNT = 360  # by which the middle of a section is found
 _MAX_OPENING = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
@@ -64,7 +67,7 @@ class Developable(PlacedFrustum):
         f = self.frustum
         if not f.radius1 > 0.0:
             raise GeometryError("radius1 must be above 0 m: a bent side is laid out from its end 1, which has no arc")
-        check_bends(self.bends, f.wrap)
+        _check_bends(self.bends, f.wrap)
         if not math.isfinite(self.lift):
             raise GeometryError(f"the lift of a bent side must be finite, got {self.lift!r} m")
         sunk = self.lift * self.growth
@@ -200,7 +203,7 @@ class Developable(PlacedFrustum):
             phi = phi % math.tau
         number = np.clip(np.searchsorted(self._starts, phi, side="right") - 1, 0, None)
         share = np.array([strip.arc / bend.width for strip, bend in zip(self._strips, self.bends, strict=True)])
-        at, way, normal = frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
+        at, way, normal = _frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
         return at + self.lift * normal, way, normal
 
     def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -315,7 +318,7 @@ class Developable(PlacedFrustum):
         if not self.closed:
             raise GeometryError("only a full wrap can be turned: a partial one has edges where it ends")
         turn %= math.tau
-        bends = bends_between(self.bends, turn, turn + math.tau, around=True)
+        bends = _bends_between(self.bends, turn, turn + math.tau, around=True)
         return Developable(self.frustum, self.link_frustum @ self._frame_at(0.0, turn), bends, self.lift)
 
     def _frame_at(self, u: float, phi: float) -> Pose:
@@ -343,4 +346,70 @@ class Developable(PlacedFrustum):
         f = self.frustum
         frustum = Frustum(f.radius_at(u1), f.radius_at(u2), (u2 - u1) * f.cos_half_angle, phi2 - phi1)
         pose = self.link_frustum @ self._frame_at(u1, phi1)
-        return Developable(frustum, pose, bends_between(self.bends, phi1, phi2, self.closed))
+        return Developable(frustum, pose, _bends_between(self.bends, phi1, phi2, self.closed))
+
+
+def _bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool = False) -> tuple[Bend, ...]:
+    """Return the bends between two azimuths [rad], those at the edges cut.
+
+    Args:
+        bends: from phi = 0 on.
+        phi1: first azimuth, not below 0.
+        phi2: last azimuth.
+        around: True where the first bend follows the last one again; else the last one goes on.
+    """
+    parts, begin = [], 0.0
+    wrap = math.fsum(bend.width for bend in bends)
+    beyond = phi2 - wrap
+    if around:
+        bends = tuple(bends) * max(1, math.ceil(phi2 / wrap - _MIN_BEND_WIDTH))
+    elif beyond > _MIN_BEND_WIDTH:
+        bends = (*bends, Bend(beyond, bends[-1].turn * beyond / bends[-1].width))
+    for bend in bends:
+        low, high = max(begin, phi1), min(begin + bend.width, phi2)
+        if high - low > _MIN_BEND_WIDTH:
+            parts.append(Bend(high - low, bend.turn * (high - low) / bend.width))
+        begin += bend.width
+    return tuple(parts)
+
+
+def _frames_along(
+    strips: Sequence[BentStrip], number: NDArray[np.int64], along: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return points of end 1 [m], rulings and normals for many places: shapes (..., 3).
+
+    Args:
+        strips: of a side.
+        number: of the strip of each place, shape (...).
+        along: distance of each place from the first ruling of its strip [m], shape (...).
+    """
+    import numpy as np
+
+    at, t, u, n = (np.array([getattr(strip.first, name) for strip in strips])[number] for name in ("at", "t", "u", "n"))
+    g = np.array([strip.g for strip in strips])[number][..., None]
+    k = np.array([strip.k for strip in strips])[number][..., None]
+    along = along[..., None]
+    angle = np.hypot(g, k) * along
+    first = along * np.sinc(angle / np.pi)
+    second = 0.5 * (along * np.sinc(0.5 * angle / np.pi)) ** 2
+    step = first * t - second * (k * n + g * u)
+    return at + step, u + g * step, n + k * step
+
+
+def _check_bends(bends: Sequence[Bend], wrap: float) -> None:
+    """Check that bends are possible and add up to a wrap [rad].
+
+    Raises:
+        GeometryError: a bend is not finite or turns too far, or they do not add up.
+    """
+    for bend in bends:
+        if not (math.isfinite(bend.width) and bend.width > 0.0 and math.isfinite(bend.turn)):
+            raise GeometryError(f"a bend needs a width above 0 rad and a finite turn, got {bend}")
+        if abs(bend.turn) > math.tau:
+            raise GeometryError(f"a bend turns by a full turn (2 pi rad) at most, got {bend.turn!r} rad")
+    width = math.fsum(bend.width for bend in bends)
+    if abs(width - wrap) > _WRAP_ROUNDING:
+        raise GeometryError(
+            f"the widths of the bends must add up to the wrap of {math.degrees(wrap):.6g} deg, they are "
+            f"{math.degrees(width):.6g} deg"
+        )

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import unicodedata
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,7 +22,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline, PathSegment, joint_bounds
-from .part_labels import PartLabel, ascii_text, part_labels, strip_label
+from .part_labels import PartLabel, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
 from .touch_marks import CoverMarks
 
@@ -198,7 +199,7 @@ def cut_sheets(
             f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, "
             f"{edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
         )
-    plain = ascii_text(title)[:_LONGEST_TITLE]
+    plain = _ascii_text(title)[:_LONGEST_TITLE]
     place = place or PlacedFrustum(layout.sheet)
     flat = layout
 
@@ -217,7 +218,7 @@ def cut_sheets(
             strokes = _marks(layout, surface, index, crosses) + _border(
                 layout, surface, index, overlap if index == 4 else 0.0
             )
-            labels = part_labels(layout, surface, (*text, ascii_text(material)), crosses.clear if crosses else None)
+            labels = part_labels(layout, surface, (*text, _ascii_text(material)), crosses.clear if crosses else None)
             labels += tuple(crosses.labels()) if crosses else ()
             parts = (CutPart(name, strokes, labels),)
         return CutSheet(
@@ -233,6 +234,13 @@ def cut_sheets(
         sheet(6, "upper electrodes", 3, "inside", foil=True),
         sheet(7, "upper substrate", 4, "inside"),
     )
+
+
+def _ascii_text(text: str) -> str:
+    """Return a text in ASCII, which every cutter has letters for: accents are dropped, other letters become ?."""
+    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    letters = (letter for letter in plain if not unicodedata.combining(letter))
+    return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
 
 
 def nest_sheets(sheets: tuple[CutSheet, ...], gap: float = 10e-3) -> tuple[CutSheet, ...]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -60,13 +59,6 @@ class PartLabel:
         for a in (-0.5 * self.width, 0.5 * self.width):
             for b in (-0.5 * self.height, 0.5 * self.height):
                 yield self.x + a * c - b * s, self.y + a * s + b * c
-
-
-def ascii_text(text: str) -> str:
-    """Return a text in ASCII, which every cutter has letters for: accents are dropped, other letters become ?."""
-    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
-    letters = (letter for letter in plain if not unicodedata.combining(letter))
-    return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
 
 
 def _text_width(text: str, height: float) -> float:

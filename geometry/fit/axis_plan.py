@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cone_fit import InfiniteCone
 from .intervals import balance_borders, choose_intervals, longest_intervals
 from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
@@ -121,10 +120,7 @@ def _worthiest(
 
 SideLine = tuple[float, float]  #: radius at z = 0 of the profile's frame [m], and dr/dz
 
-_RADIUS_BIN = 0.0005  # m; of the histogram of radii
-_MAX_PEAKS = 3  # radii tried for each slope
 _MIN_CELL_SHARE = 0.97  # of the largest side so far: fewer cells near a line hold no larger one
-_LINE_BINS = 4  # least distance between two of them: 2 mm
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,36 +169,6 @@ class AxisPlan:
     def score(self, requirements: SheetRequirements) -> float:
         """Return the area, less what each sheet has to add to be worth its wires [m2]."""
         return self.area - requirements.least_gain * len(self.sides)
-
-
-def side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[SideLine]:
-    """Return the straight sides near which partial wraps are looked for: those of the cones, and frequent radii.
-
-    Args:
-        profile: the hull about the axis.
-        cones: about the same axis.
-    """
-    lines: list[SideLine] = []
-    for cone in cones:
-        slope = math.tan(cone.half_angle)
-        lines.append((cone.radius - slope * float((cone.origin - profile.frame.origin) @ profile.frame.axis), slope))
-    for slope in {0.0, *(slope for _, slope in lines)}:
-        radii = (profile.radius - slope * profile.z[:, None])[profile.radius > 0.0]
-        if len(radii) == 0:
-            continue
-        low = float(radii.min())
-        places = ((radii - low) / _RADIUS_BIN).astype(np.int64)
-        counts = np.convolve(np.bincount(places, weights=np.abs(radii)), np.ones(3), "same")
-        for _ in range(_MAX_PEAKS):
-            top = int(counts.argmax())
-            near = radii[np.abs(radii - low - (top + 0.5) * _RADIUS_BIN) <= 1.5 * _RADIUS_BIN]
-            if len(near) == 0 or len(near) < 0.01 * profile.radius.size:
-                break
-            line = (float(np.median(near)), slope)
-            if all(abs(line[0] - r) > 0.5 * _RADIUS_BIN or s != slope for r, s in lines):
-                lines.append(line)
-            counts[max(0, top - _LINE_BINS) : top + _LINE_BINS + 1] = 0.0
-    return lines
 
 
 def plan_sheets(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets, side_lines
+from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets
 from .candidates import SampledLink
 from .cone_fit import InfiniteCone
 from .profile import AxisFrame, RadialProfile, measure_profile
@@ -24,6 +24,9 @@ _AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a
 _MAX_ROUNDS = 4  # at one step
 _LOOSE_FACTOR = 1.6  # times the tolerance, where nothing fits within it
 _ENOUGH_SHARE = 0.97  # of the sheet within the looser tolerance; more is hardly to be found
+_RADIUS_BIN = 0.0005  # m; of the histogram of radii
+_MAX_PEAKS = 3  # radii tried for each slope
+_LINE_BINS = 4  # least distance between two of them: 2 mm
 
 
 def _search_axis(
@@ -127,8 +130,38 @@ def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[Axis
     for candidate in link.axes:
         frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)
         profile = profile_about(link, frame, _COARSE_GRID, requirements)
-        surveys.append(AxisSurvey(profile, side_lines(profile, candidate.cones)))
+        surveys.append(AxisSurvey(profile, _side_lines(profile, candidate.cones)))
     return surveys
+
+
+def _side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[SideLine]:
+    """Return the straight sides near which partial wraps are looked for: those of the cones, and frequent radii.
+
+    Args:
+        profile: the hull about the axis.
+        cones: about the same axis.
+    """
+    lines: list[SideLine] = []
+    for cone in cones:
+        slope = math.tan(cone.half_angle)
+        lines.append((cone.radius - slope * float((cone.origin - profile.frame.origin) @ profile.frame.axis), slope))
+    for slope in {0.0, *(slope for _, slope in lines)}:
+        radii = (profile.radius - slope * profile.z[:, None])[profile.radius > 0.0]
+        if len(radii) == 0:
+            continue
+        low = float(radii.min())
+        places = ((radii - low) / _RADIUS_BIN).astype(np.int64)
+        counts = np.convolve(np.bincount(places, weights=np.abs(radii)), np.ones(3), "same")
+        for _ in range(_MAX_PEAKS):
+            top = int(counts.argmax())
+            near = radii[np.abs(radii - low - (top + 0.5) * _RADIUS_BIN) <= 1.5 * _RADIUS_BIN]
+            if len(near) == 0 or len(near) < 0.01 * profile.radius.size:
+                break
+            line = (float(np.median(near)), slope)
+            if all(abs(line[0] - r) > 0.5 * _RADIUS_BIN or s != slope for r, s in lines):
+                lines.append(line)
+            counts[max(0, top - _LINE_BINS) : top + _LINE_BINS + 1] = 0.0
+    return lines
 
 
 def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: SheetRequirements) -> list[AxisSurvey]:
@@ -154,7 +187,7 @@ def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: S
             profile = profile_about(link, better, _COARSE_GRID, requirements)
             moved = float((better.origin - frame.origin) @ frame.axis)
             cone = InfiniteCone(better.origin, better.axis, side.radius + side.slope * moved, math.atan(side.slope))
-            found.append(AxisSurvey(profile, side_lines(profile, (cone,))))
+            found.append(AxisSurvey(profile, _side_lines(profile, (cone,))))
     return found
 
 

@@ -144,11 +144,6 @@ def _swap_words(data: bytes) -> bytes:
     return bytes(swapped)
 
 
-def undo_newlines(data: bytes) -> bytes:
-    """Return the bytes as they were before each line feed became CR LF."""
-    return data.replace(b"\r\n", b"\n")
-
-
 def undo_slip(data: bytes) -> bytes:
     """Return the bytes as they were before they were wrapped in SLIP (RFC 1055)."""
     return data.replace(b"\xc0", b"").replace(b"\xdb\xdc", b"\xc0").replace(b"\xdb\xdd", b"\xdb")

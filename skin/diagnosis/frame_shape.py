@@ -14,7 +14,7 @@ from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause
 from .foreign_checksum import find_checksum
-from .foreign_stream import first_line, undo_newlines, undo_slip
+from .foreign_stream import first_line, undo_slip
 
 _MIN_STARTS = 4  # that look like a frame's beginning
 _AGREEING_SHARE = 0.6  # of them that must agree
@@ -142,7 +142,7 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
         return None
     share = f"{100.0 * (1.0 - found.covered):.1f} % of the bytes are no frames"
     for cause, words, undo in (
-        (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", undo_newlines),
+        (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", _undo_newlines),
         (Cause.SLIP, "the frames are wrapped in SLIP", undo_slip),
     ):
         frames, covered = count_frames(undo(data))
@@ -170,6 +170,11 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
     if printable_share(between) > 0.9:
         return Cause.TEXT.found(f"text stands between the frames: {first_line(between)!r}")
     return Cause.DAMAGED.found(f"{share}, such as {short_hex(max(found.gaps, key=len))}")
+
+
+def _undo_newlines(data: bytes) -> bytes:
+    """Return the bytes as they were before each line feed became CR LF."""
+    return data.replace(b"\r\n", b"\n")
 
 
 def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:

@@ -21,7 +21,7 @@ from .disc import Disc, Discs, check_discs
 from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
 from .multipole import FIRST, LADDER, higher, resolution, solve_discs
 from .one_scene import SceneSolver, scene_solver
-from .rim import near_apex, solve_rims
+from .rim import solve_rims
 from .sheet import SectorSheet
 
 #: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
@@ -175,7 +175,7 @@ class FieldModel:
     def _solve_rims(self, discs: Discs, index: int, found: Floats) -> Floats:
         """Solve one scene that multipoles do not resolve; return what was found by them where this is no better."""
         one = discs.scenes(np.array([index]))
-        if not near_apex(self.sheet, one):
+        if not _near_apex(self.sheet, one):
             return found
         got = solve_rims(self.sheet, self.upper_resistance, self.lower_resistance, one, self.tolerance)
         return found if found[6] <= got.error[0] else _numbers(got)[:, 0]
@@ -188,6 +188,14 @@ class FieldModel:
             f" {self.tolerance:g}: leave more room to the apex, to the edges and between contacts, or raise the model's"
             " tolerance"
         )
+
+
+def _near_apex(sheet: SectorSheet, discs: Discs) -> bool:
+    """Tell whether a disc of one scene is so near the apex that multipoles die away slower than exp(-m/3)."""
+    stretch = sheet.stretch(discs.u)
+    return bool(
+        (np.log(np.maximum(stretch, 1e-300) / (abs(sheet.curvature) * discs.radius + 1e-300)) < 1.0 / 6.0).any()
+    )
 
 
 def _numbers(coupling: Coupling) -> Floats:

@@ -133,14 +133,6 @@ _SERIES_BELOW = 2.0  # kr below which the Bessel functions' small parts come fro
 _LOGARITHM_WINDOW = 8.0  # kr beyond which the logarithm of K_0 is not split off: K_0 is smooth there, and I_0 large
 
 
-def near_apex(sheet: SectorSheet, discs: Discs) -> bool:
-    """Tell whether a disc of one scene is so near the apex that multipoles die away slower than exp(-m/3)."""
-    stretch = sheet.stretch(discs.u)
-    return bool(
-        (np.log(np.maximum(stretch, 1e-300) / (abs(sheet.curvature) * discs.radius + 1e-300)) < 1.0 / 6.0).any()
-    )
-
-
 def solve_rims(
     sheet: SectorSheet, upper_resistance: float, lower_resistance: float, discs: Discs, tolerance: float
 ) -> Coupling:

@@ -212,8 +212,3 @@ def counts_of(frame: Frame) -> dict[str, int]:
     """Return the readings that a frame carries."""
     counts = {name: getattr(frame, name) for name in _COMMON_NAMES}
     return counts if frame.driven is None else counts | frame.driven._asdict()
-
-
-def with_counts(frame: Frame, changes: Mapping[str, int]) -> Frame:
-    """Return the frame with other readings; it must carry them."""
-    return frame_of(frame[:6], {**counts_of(frame), **changes})

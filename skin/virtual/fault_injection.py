@@ -7,12 +7,13 @@ n - 1, 2 n - 1 and so on; ``..._after=n`` hits frame n and, where the fault last
 from __future__ import annotations
 
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.skin.wire import Frame, Status, encode
 
-from .circuit import ConverterInputs, WiringFaults, counts_of, with_counts
+from .circuit import ConverterInputs, WiringFaults, counts_of, frame_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +152,13 @@ class FaultyLine:
         key = (frame.device, frame.sensor)
         if _from(faults.stuck_after, index):
             kept = self._stuck.setdefault(key, frame)
-            frame = with_counts(frame, {name: counts_of(kept)[name] for name in self._stuck_channels(kept)})
+            frame = _with_counts(frame, {name: counts_of(kept)[name] for name in self._stuck_channels(kept)})
         if _from(faults.saturate_after, index):
-            frame = with_counts(frame, dict.fromkeys(self._stuck_channels(frame), faults.saturate_count))
+            frame = _with_counts(frame, dict.fromkeys(self._stuck_channels(frame), faults.saturate_count))
         if _from(faults.gain_after, index):
             counts = counts_of(frame)
             spoilt = {name: min(round(faults.gain * counts[name]), 0xFFFF) for name in _INPUT_READINGS[faults.gain_of]}
-            frame = with_counts(frame, spoilt)
+            frame = _with_counts(frame, spoilt)
         if _from(faults.status_after, index):
             frame = frame._replace(status=frame.status | faults.status)
         if _from(faults.clock_jump_after, index):
@@ -197,6 +198,11 @@ class FaultyLine:
             return b""
         data, self._held = data + self._held, b""
         return data
+
+
+def _with_counts(frame: Frame, changes: Mapping[str, int]) -> Frame:
+    """Return the frame with other readings; it must carry them."""
+    return frame_of(frame[:6], {**counts_of(frame), **changes})
 
 
 def _from(after: int | None, index: int) -> bool:

@@ -4,36 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import ipaddress
 import socket
-
-from coneskin.robot.sim.urscript.values import ScriptError
 
 _PENDING_ERRORS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 _MAX_UNREAD = 65_536  # bytes that have come and that the program has not read; more wait in the network
 _MAX_READS = 10  # of one connection in a control cycle; an assumption, so that a program that is sent more gives way
-
-
-def may_connect(address: str, beyond: bool) -> str:
-    """Return the numeric address to which a program may connect.
-
-    Args:
-        address: IPv4 address, or "localhost"; the simulator looks no names up, as that could take seconds.
-        beyond: whether it may be another computer: only where others reach the simulator as well.
-
-    Raises:
-        ScriptError: the program may not connect to it.
-    """
-    try:
-        found = ipaddress.IPv4Address("127.0.0.1" if address == "localhost" else address)
-    except ValueError as exc:
-        raise ScriptError(f"socket_open takes an IPv4 address or localhost, got {address[:99]!r}") from exc
-    if not (found.is_loopback or beyond):
-        raise ScriptError(
-            f"socket_open({address!r}): a simulator that listens on this computer alone connects to nothing beyond it; "
-            "start it with --host 0.0.0.0"
-        )
-    return str(found)
 
 
 class ScriptSocket:

@@ -10,6 +10,7 @@ rpc_factory) and chapter "Remote Procedure Call (RPC)"; its article "XML-RPC com
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import re
 import struct
@@ -23,7 +24,7 @@ from coneskin.robot.sim.urscript.value_functions import text_of
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 
 from .script_host import CallingProgram, ScriptHost
-from .script_socket import ScriptSocket, may_connect
+from .script_socket import ScriptSocket
 
 _MAX_SOCKETS = 32  # of one program, at once; an assumption
 _MAX_VALUES = 30  # of one read
@@ -41,7 +42,7 @@ class SocketFunctions:
 
     def socket_open(self, address: Any, port: Any, socket_name: Any = _SOCKET_NAME) -> Generator[None, None, bool]:
         """Connect to a server; return whether that worked."""
-        where = may_connect(str(address), self._host.beyond)
+        where = _may_connect(str(address), self._host.beyond)
         if not 0 < int(port) < 65536:
             raise ScriptError(f"a port is from 1 to 65535, got {show(port)}")
         self.socket_close(socket_name)
@@ -219,6 +220,28 @@ class SocketFunctions:
                 return
 
 
+def _may_connect(address: str, beyond: bool) -> str:
+    """Return the numeric address to which a program may connect.
+
+    Args:
+        address: IPv4 address, or "localhost"; the simulator looks no names up, as that could take seconds.
+        beyond: whether it may be another computer: only where others reach the simulator as well.
+
+    Raises:
+        ScriptError: the program may not connect to it.
+    """
+    try:
+        found = ipaddress.IPv4Address("127.0.0.1" if address == "localhost" else address)
+    except ValueError as exc:
+        raise ScriptError(f"socket_open takes an IPv4 address or localhost, got {address[:99]!r}") from exc
+    if not (found.is_loopback or beyond):
+        raise ScriptError(
+            f"socket_open({address!r}): a simulator that listens on this computer alone connects to nothing beyond it; "
+            "start it with --host 0.0.0.0"
+        )
+    return str(found)
+
+
 def _count(value: Any) -> int:
     if not 1 <= int(value) <= _MAX_VALUES:
         raise ScriptError(f"one read takes 1 to {_MAX_VALUES} values, got {show(value)}")
@@ -258,7 +281,7 @@ class RemoteHandle:
             port = 0
         if parts.scheme != "http" or not parts.hostname or not port:
             raise ScriptError(f'rpc_factory takes a URL such as "http://127.0.0.1:8000/RPC2", got {show(url)}')
-        self._address = may_connect(parts.hostname, beyond), port
+        self._address = _may_connect(parts.hostname, beyond), port
         self._path = (parts.path or "/RPC2").encode("ascii", "replace")
 
     def call(self, name: str, arguments: Any, host: ScriptHost) -> Generator[None, None, Any]:

@@ -80,11 +80,6 @@ def safety_bits(mode: SafetyMode) -> int:
     return _SAFETY_BITS[mode]
 
 
-def robot_bits(mode: RobotMode, program: bool) -> int:
-    """Return RTDE's robot_status_bits: 0 power on, 1 program running, 2 teach button, 3 power button."""
-    return int(mode is not RobotMode.POWER_OFF) | int(program) << 1
-
-
 Version = tuple[int, int]
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others

@@ -19,7 +19,7 @@ from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
-from coneskin.robot.sim.machine.states import MOVING, RobotMode, Runtime, Version, robot_bits, safety_bits
+from coneskin.robot.sim.machine.states import MOVING, RobotMode, Runtime, Version, safety_bits
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import (
@@ -103,7 +103,7 @@ class RtdeOutputs:
             "robot_mode": lambda: int(c.robot_mode),
             "safety_mode": lambda: int(c.safety),
             "safety_status": lambda: int(c.safety),
-            "robot_status_bits": lambda: robot_bits(c.robot_mode, c.runtime is Runtime.PLAYING),
+            "robot_status_bits": lambda: _robot_bits(c.robot_mode, c.runtime is Runtime.PLAYING),
             "safety_status_bits": lambda: safety_bits(c.safety),
             "speed_scaling": lambda: c.speed_scaling if c.safety in MOVING else 0.0,
             "target_speed_fraction": lambda: c.slider,
@@ -193,6 +193,11 @@ class RtdeOutputs:
     def _target_tcp_speed(self) -> Value:
         arm = self._c.arm
         return self._tcp_speed() if arm.measured.qd is arm.qd else tuple(arm.twist())
+
+
+def _robot_bits(mode: RobotMode, program: bool) -> int:
+    """Return RTDE's robot_status_bits: 0 power on, 1 program running, 2 teach button, 3 power button."""
+    return int(mode is not RobotMode.POWER_OFF) | int(program) << 1
 
 
 def elbow_velocity(arm: SimulatedArm) -> Vector:

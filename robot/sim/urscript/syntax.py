@@ -13,7 +13,7 @@ from typing import NamedTuple
 from .values import CHANGING_METHODS, MAX_ITEMS, ScriptError
 
 
-class Token(NamedTuple):
+class _Token(NamedTuple):
     """Word, number, text or sign of a program.
 
     Attributes:
@@ -38,13 +38,13 @@ _NEXT_TOKEN = re.compile(
 _PLACE_MARK = re.compile(r"[^\S\n]*\$[^\n]*")  # what PolyScope writes to show where its program is: $ 2 "MoveJ"
 
 
-def tokens_of(text: str) -> list[Token]:
+def _tokens_of(text: str) -> list[_Token]:
     """Cut a program into tokens, and add an "end" to them.
 
     Raises:
         ScriptError: a part of it is not URScript.
     """
-    found: list[Token] = []
+    found: list[_Token] = []
     position, line, first = 0, 1, True
     while True:
         if first and (mark := _PLACE_MARK.match(text, position)):
@@ -56,7 +56,7 @@ def tokens_of(text: str) -> list[Token]:
         if kind == "line":
             line, first = line + 1, True
         elif kind != "comment":
-            found.append(Token(kind, match[kind], line, first or kind == "end"))
+            found.append(_Token(kind, match[kind], line, first or kind == "end"))
             if kind == "end":
                 return found
             first = False
@@ -103,13 +103,13 @@ class ExpressionParser:
     def __init__(self, text: str, functions: Set[str], builtins: Set[str], blocking: Set[str]) -> None:
         self._text = text
         self._functions, self._builtins, self._blocking = functions, builtins, blocking
-        self._tokens = tokens_of(text)
+        self._tokens = _tokens_of(text)
         self._at = self._depth = self._brackets = 0
 
     # tokens
 
     @property
-    def _token(self) -> Token:
+    def _token(self) -> _Token:
         return self._tokens[self._at]
 
     def _next_is(self, *texts: str) -> bool:
@@ -117,7 +117,7 @@ class ExpressionParser:
         kind, text, _, first = self._tokens[self._at]
         return text in texts and kind != "string" and not (first and self._brackets == 0)
 
-    def _take(self, text: str = "") -> Token:
+    def _take(self, text: str = "") -> _Token:
         token = self._tokens[self._at]
         if token.kind == "end" or (text and token.text != text):
             late = token.first and (self._brackets == 0 or token.text in _RESERVED_WORDS)

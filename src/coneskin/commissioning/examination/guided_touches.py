@@ -6,6 +6,7 @@ is whatever moves a reading away from where it rested, and stays.
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections import deque
@@ -22,7 +23,7 @@ from coneskin.skin.detection.frame.untouched import UntouchedCurrents, Untouched
 from coneskin.skin.detection.self_test import FrameSelfTest
 from coneskin.skin.wire import Frame, FrameDecoder
 
-from .wires import READING_NAMES, TouchReadings, touch_places, touch_words
+from .wires import READING_NAMES, TouchReadings, touch_places
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
@@ -92,7 +93,7 @@ class _WireTouches(TouchJudge[TouchReadings]):
     def __init__(self, sensor: Sensor) -> None:
         super().__init__()
         self.touched: dict[str, TouchReadings] = {}
-        self._marks = {name: Mark(*place, touch_words(sensor, name)) for name, place in touch_places(sensor).items()}
+        self._marks = {name: Mark(*place, _touch_words(sensor, name)) for name, place in touch_places(sensor).items()}
 
     def ask(self) -> Notice:
         self.mark = list(self._marks.values())[len(self.touched)]
@@ -104,6 +105,20 @@ class _WireTouches(TouchJudge[TouchReadings]):
         self.touched[list(self._marks)[len(self.touched)]] = reading
         self.mark, self.over = None, len(self.touched) == len(self._marks)
         return [Notice("read", "let go")]
+
+
+def _touch_words(sensor: Sensor, electrode: str) -> str:
+    """Return the place near an electrode, for a person."""
+    u, phi = touch_places(sensor)[electrode]
+    where = {
+        "A": "end 2, half way between the straight edges",
+        "B": "end 1, half way between the straight edges",
+        "C": "the straight edge phi = wrap, half way between the ends",
+        "D": "the straight edge phi = 0, half way between the ends",
+    }[electrode]
+    return (
+        f"{sensor.name} near electrode {electrode}: {where} (u = {1e3 * u:.0f} mm, phi = {math.degrees(phi):.0f} deg)"
+    )
 
 
 class _TouchCapture:

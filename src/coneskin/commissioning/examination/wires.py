@@ -155,20 +155,6 @@ class WirePatch(NamedTuple):
     keys: dict[str, str]
 
 
-def touch_words(sensor: Sensor, electrode: str) -> str:
-    """Return the place near an electrode, for a person."""
-    u, phi = touch_places(sensor)[electrode]
-    where = {
-        "A": "end 2, half way between the straight edges",
-        "B": "end 1, half way between the straight edges",
-        "C": "the straight edge phi = wrap, half way between the ends",
-        "D": "the straight edge phi = 0, half way between the ends",
-    }[electrode]
-    return (
-        f"{sensor.name} near electrode {electrode}: {where} (u = {1e3 * u:.0f} mm, phi = {math.degrees(phi):.0f} deg)"
-    )
-
-
 def examine_wires(sensor: Sensor, touched: Mapping[str, TouchReadings]) -> tuple[Finding, WirePatch | None]:
     """Find exchanged wires by the readings of the touches near A, B, C and D.
 

@@ -83,7 +83,7 @@ class SheetBody:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StrandBody:
+class _StrandBody:
     """Spheres about points: tabs, wires, a cable with its tie and its connector, or samples of another link."""
 
     points: Floats
@@ -169,9 +169,9 @@ class TabApron:
         feet = points + (height + slope * far)[:, None] * normals
         return cls(*at, feet, np.stack([rim, tips], 1), normals, slope)
 
-    def body(self) -> StrandBody:
+    def body(self) -> _StrandBody:
         """Return the space that the tabs take."""
-        return StrandBody(self.feet, 1.5e-3)
+        return _StrandBody(self.feet, 1.5e-3)
 
     def stands_in(self, rays: RayCaster | None) -> bool:
         """Tell whether the link stands out where the tabs leave."""
@@ -221,12 +221,12 @@ class CableWay:
         """Length of the way from the rim to the cable tie [m]."""
         return float(self.lengths[self.tie])
 
-    def body(self) -> StrandBody:
+    def body(self) -> _StrandBody:
         """Return the space of the cable with its tie and its connector."""
         lifted = self.points + CABLE_RADIUS * self.normals
         ends = [self.tie, len(lifted) - 1]
         ring = [lifted[ends] + (MOUNT_REACH - CABLE_RADIUS) * way for way in _ways_around(self.normals[ends])]
-        return StrandBody(np.concatenate([lifted, *ring]), CABLE_RADIUS)
+        return _StrandBody(np.concatenate([lifted, *ring]), CABLE_RADIUS)
 
 
 @dataclass(frozen=True, eq=False)

@@ -320,11 +320,6 @@ def section_head(title: str) -> tuple[str, str, str]:
     return "", f"### {title}", ""
 
 
-def in_ohms(ohms: float) -> str:
-    """Return a resistance with its unit."""
-    return f"{ohms / 1e3:.3g} kohm" if ohms >= 1e3 else f"{ohms:.3g} ohm"
-
-
 def in_mm(metres: float) -> str:
     """Return a length with its unit."""
     return f"{1e3 * metres:.1f} mm"
@@ -333,25 +328,3 @@ def in_mm(metres: float) -> str:
 def side_name(side: str) -> str:
     """Return the name of a side of a sheet as the guide has it."""
     return {"end1": "end 1", "end2": "end 2", "edge0": "edge 0", "edge1": "the edge of C"}[side]
-
-
-def way_text(design: SheetDesign) -> str:
-    """Return where the cable leaves a sheet, and where its tie and its connector lie, as a ruler finds them."""
-    way, side = design.way, design.place.frustum
-    if way.side.startswith("edge"):
-        where = f"{in_mm(way.u)} from end 1"
-    else:
-        arc, around = way.phi * side.radius_at(way.u), 2.0 * math.pi * side.radius_at(way.u)
-        back = arc > 0.5 * around
-        way_on = "against" if back else "in"
-        where = f"{in_mm(around - arc if back else arc)} from edge 0, {way_on} the direction of the wrap"
-    parts = [f"they leave {side_name(way.side)} {where}"]
-    for what, index in (("tie", way.tie), ("connector", -1)):
-        u, phi = way.surface[index]
-        end = "end 1" if abs(u) < abs(u - side.slant) else "end 2"
-        off = -u if end == "end 1" else u - side.slant
-        turn = math.remainder(phi - way.phi, 2.0 * math.pi) * side.radius_at(min(max(u, 0.0), side.slant))
-        beyond = f"{in_mm(off)} beyond {end}" if off >= 0.0 else f"{in_mm(-off)} inwards of the line of {end}"
-        aside = f", {in_mm(abs(turn))} {'on' if turn > 0.0 else 'back'} around" if abs(turn) > 2e-3 else ""
-        parts.append(f"the {what} lies {beyond}{aside}")
-    return "; ".join(parts)

@@ -23,11 +23,9 @@ from .build_figures import (
     WIRE_COLOURS,
     BuildFigures,
     in_mm,
-    in_ohms,
     section_head,
     side_name,
     table_head,
-    way_text,
 )
 from .placement_text import placement_lines
 
@@ -86,9 +84,9 @@ def _flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
     )
     ab, cd = figures.pairs
     yield (
-        f"Measure with a multimeter, a probe on each tab: A-B {in_ohms(ab.ohms)}, C-D {in_ohms(cd.ohms)}, each within "
-        f"{SPREAD:.0%}. More: a foil does not touch its sheet over its whole length; roll it again. *Check:* the "
-        "reading stays within 5 % while a finger moves along each foil."
+        f"Measure with a multimeter, a probe on each tab: A-B {_in_ohms(ab.ohms)}, C-D {_in_ohms(cd.ohms)}, each "
+        f"within {SPREAD:.0%}. More: a foil does not touch its sheet over its whole length; roll it again. *Check:* "
+        "the reading stays within 5 % while a finger moves along each foil."
     )
     yield (
         f"Wires to the tabs, in the colours and lengths of the table below: strip {in_mm(STRIPPED)} of each wire, lay "
@@ -109,6 +107,11 @@ def _flat_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
         "end 1 down, numbers 1, 2, 3 run along end 1 from edge 0 at the left, 4 to 6 come back above them, and 7 to 9 "
         "go on along end 2; the table of coordinates below has their places."
     )
+
+
+def _in_ohms(ohms: float) -> str:
+    """Return a resistance with its unit."""
+    return f"{ohms / 1e3:.3g} kohm" if ohms >= 1e3 else f"{ohms:.3g} ohm"
 
 
 def _ends(cut: CutSheet) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -227,7 +230,7 @@ def _cable_steps(design: SheetDesign) -> Iterator[str]:
             "connector hang from it."
         )
     yield (
-        f"Lead the four wires together: {way_text(design)}. Glue the cable-tie mount {ground} there, "
+        f"Lead the four wires together: {_way_text(design)}. Glue the cable-tie mount {ground} there, "
         f"{in_mm(way.tie_length)} along the cable from the rim. Lay the wires flat, leave a loop of 20 mm so that no "
         f"pull reaches a tab, and tie them down. Crimp the connector {in_mm(way.connector_length)} from the rim: pin 1 "
         "A (red), pin 2 B (black), pin 3 C (yellow), pin 4 D (green). *Check:* pull each wire as hard as 3 N behind "
@@ -236,12 +239,34 @@ def _cable_steps(design: SheetDesign) -> Iterator[str]:
     )
 
 
+def _way_text(design: SheetDesign) -> str:
+    """Return where the cable leaves a sheet, and where its tie and its connector lie, as a ruler finds them."""
+    way, side = design.way, design.place.frustum
+    if way.side.startswith("edge"):
+        where = f"{in_mm(way.u)} from end 1"
+    else:
+        arc, around = way.phi * side.radius_at(way.u), 2.0 * math.pi * side.radius_at(way.u)
+        back = arc > 0.5 * around
+        way_on = "against" if back else "in"
+        where = f"{in_mm(around - arc if back else arc)} from edge 0, {way_on} the direction of the wrap"
+    parts = [f"they leave {side_name(way.side)} {where}"]
+    for what, index in (("tie", way.tie), ("connector", -1)):
+        u, phi = way.surface[index]
+        end = "end 1" if abs(u) < abs(u - side.slant) else "end 2"
+        off = -u if end == "end 1" else u - side.slant
+        turn = math.remainder(phi - way.phi, 2.0 * math.pi) * side.radius_at(min(max(u, 0.0), side.slant))
+        beyond = f"{in_mm(off)} beyond {end}" if off >= 0.0 else f"{in_mm(-off)} inwards of the line of {end}"
+        aside = f", {in_mm(abs(turn))} {'on' if turn > 0.0 else 'back'} around" if abs(turn) > 2e-3 else ""
+        parts.append(f"the {what} lies {beyond}{aside}")
+    return "; ".join(parts)
+
+
 def _test_steps(figures: BuildFigures, folder: str) -> Iterator[str]:
     """Yield the steps that test the sheet that is built."""
     sensor = "sensor.toml" if folder == "." else f"{folder}/sensor.toml"
     ab, cd = figures.pairs
     yield (
-        f"Measure at the connector: pins 1-2 {in_ohms(ab.ohms)}, pins 3-4 {in_ohms(cd.ohms)}; pins 1-3 above 10 Mohm "
+        f"Measure at the connector: pins 1-2 {_in_ohms(ab.ohms)}, pins 3-4 {_in_ohms(cd.ohms)}; pins 1-3 above 10 Mohm "
         "while nothing touches the sensor, and far less while a thumb presses its middle; again above 10 Mohm once it "
         "is lifted."
     )
@@ -268,7 +293,7 @@ def _reading_lines(figures: BuildFigures) -> Iterator[str]:
     """Yield the tables of what a multimeter and ``coneskin monitor`` should read."""
     yield from table_head("between", "multimeter", "for a material of")
     for pair in figures.pairs:
-        yield f"| {pair.pair} | {in_ohms(pair.ohms)} | {pair.sheet_ohms:g} ohm per square |"
+        yield f"| {pair.pair} | {_in_ohms(pair.ohms)} | {pair.sheet_ohms:g} ohm per square |"
     yield "| A or B to C or D | above 10 Mohm, untouched | |"
     yield ""
     yield "Untouched frame, in counts, as `coneskin monitor` shows it with the sensor file of this design:"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
 
-from .variant_table import VariantScore, duration_words, shared_settings
+from .variant_table import VariantScore, shared_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,7 +52,7 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
         key.append(Line2D([], [], color=colour, marker=marker, ls="", label=words))
     figure.legend(handles=key, loc="outside lower left", handlelength=1.0)
     runs = max((s.runs for s in scores), default=0)
-    time = duration_words(max((s.hours for s in scores), default=0.0))
+    time = _duration_words(max((s.hours for s in scores), default=0.0))
     title = (
         f"{runs} run{'s'[: runs != 1]}"
         + ("" if differ else f", {time}")
@@ -62,6 +62,13 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
     if differ:
         _draw_places(figure.add_subplot(), scores, time)
     return figure
+
+
+def _duration_words(hours: float) -> str:
+    """Return a duration [h] in the unit in which it is short."""
+    if hours < 1.0 / 60.0:
+        return f"{3600.0 * hours:.3g} s"
+    return f"{60.0 * hours:.3g} min" if hours < 1.0 else f"{hours:.3g} h"
 
 
 def _place(score: VariantScore) -> tuple[float, float]:

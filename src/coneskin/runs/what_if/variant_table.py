@@ -101,13 +101,6 @@ def shared_settings(variants: Sequence[str]) -> tuple[list[str], list[str]]:
     return shared, names
 
 
-def duration_words(hours: float) -> str:
-    """Return a duration [h] in the unit in which it is short."""
-    if hours < 1.0 / 60.0:
-        return f"{3600.0 * hours:.3g} s"
-    return f"{60.0 * hours:.3g} min" if hours < 1.0 else f"{hours:.3g} h"
-
-
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write the rows of ``judge_runs`` as a Parquet file; errors as of ``write_parquet``."""
     names = list(dict.fromkeys(name for row in rows for name in row))
