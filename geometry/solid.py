@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
+def widest_nearby(values: Floats, rows: int, columns: int) -> Floats:
+    """Return the greatest value among neighbours up to a number of rows and columns away."""
+    from scipy.ndimage import maximum_filter
+
+    return np.asarray(maximum_filter(values, (2 * rows + 1, 2 * columns + 1), mode="nearest"))
+
+
 def without_undercut(radius: Floats, phi: Floats) -> Floats:
     """Return radii that only grow seen from the middle of a part outwards, so that it can be pulled off that way."""
     away = phi - 0.5 * (phi[0] + phi[-1])

@@ -21,7 +21,7 @@ from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.solid import shell_surface, without_undercut
+from coneskin.geometry.solid import shell_surface, widest_nearby, without_undercut
 
 from .link_excess import LinkExcess
 
@@ -285,7 +285,7 @@ class _Builder:
         first = np.where(standing.any(axis=0), standing.argmax(axis=0), len(share))
         before = wanted * share[np.clip(first - 1, 0, len(share) - 1)] - self.plan.clearance
         free = np.where(first < len(share), before, wanted)
-        free = -_widest_nearby(-free[None], 0, 1)[0]
+        free = -widest_nearby(-free[None], 0, 1)[0]
         return np.where(free < _MIN_LIP_PIECE, 0.0, free)
 
     def _part(self, phi: Floats, lengths: Floats, number: int) -> Trimesh:
@@ -298,7 +298,7 @@ class _Builder:
         lip_z = self.step + self.sign * (share * lengths - start)
         cone = self.link.cone(lip_z)
         excess = self.link.over(share[::-1, 0], lengths, phi, plan.clearance)[::-1]
-        lip = cone + _widest_nearby(excess, 1, 1) + plan.clearance
+        lip = cone + widest_nearby(excess, 1, 1) + plan.clearance
         lip = np.minimum(lip, cone + _MAX_RISE + plan.wall)  # where there is no lip, no wall either
         lip = np.where(self._above_tabs(phi), np.maximum(lip, cone + _CHANNEL_HEIGHT), lip)
         rim = _SEAT_RIM_WIDTH
@@ -313,7 +313,7 @@ class _Builder:
         near = np.abs(z[:, None] - z[None]) <= plan.wall
         outside = np.where(near, inside[None], 0.0).max(axis=1)
         beside = max(1, math.ceil(plan.wall / (float(inside.min()) * _COLUMN_STEP)))
-        outside = _widest_nearby(outside, 0, beside) + plan.wall
+        outside = widest_nearby(outside, 0, beside) + plan.wall
         seat = max(float(outside[-6:].max()), float((sleeve + plan.wall).max()))
         outside[-6:] = seat
         outside[[-6, -5, -2, -1]] += _SEAT_RIM_HEIGHT
@@ -344,10 +344,3 @@ class _Builder:
             away = np.abs((phi - tab.phi + math.pi) % math.tau - math.pi)
             near |= away < (0.5 * tab.width + _TAB_ROOM) / radius + _COLUMN_STEP
         return near
-
-
-def _widest_nearby(values: Floats, rows: int, columns: int) -> Floats:
-    """Return the greatest value among neighbours up to a number of rows and columns away."""
-    from scipy.ndimage import maximum_filter
-
-    return np.asarray(maximum_filter(values, (2 * rows + 1, 2 * columns + 1), mode="nearest"))
