@@ -3,7 +3,9 @@
 import http.client
 import socket
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
@@ -141,3 +143,27 @@ def test_the_next_free_port_is_taken() -> None:
         with PageServer("a page", port=port) as server:
             assert server.url != f"http://127.0.0.1:{port}"
             assert get(server, "/")[0] == 200
+
+
+@pytest.mark.parametrize("leaves", ["before its page stands", "later"])
+def test_what_a_viewer_began_ends_though_it_left_at_once(server: PageServer, leaves: str) -> None:
+    callbacks: dict[str, Any] = {}
+    library = SimpleNamespace(
+        on_client_connect=lambda callback: callbacks.update(connected=callback),
+        on_client_disconnect=lambda callback: callbacks.update(gone=callback),
+    )
+    client = SimpleNamespace(client_id=7, camera=SimpleNamespace(aspect=1.6))
+    ended = []
+
+    def begin(client: Any) -> Any:
+        if leaves != "later":
+            callbacks["gone"](client)
+        return lambda: ended.append(client.client_id)
+
+    with patch.object(server, "_server", library):
+        server.on_viewer(begin)
+    callbacks["connected"](client)
+    if leaves == "later":
+        assert ended == []
+        callbacks["gone"](client)
+    assert ended == [7]

@@ -135,19 +135,32 @@ class PageServer:
         Args:
             begin: takes viser's ``ClientHandle``, and returns what ends its work when the viewer has gone.
         """
-        ends: dict[int, Callable[[], None]] = {}
+        ends: dict[int, Callable[[], None]] = {}  # a stand-in of those who went while their work was being prepared
+        changing = threading.Lock()
 
         def connected(client: Any) -> None:
             if (aspect := client.camera.aspect) < 1.0:  # a phone's window is as wide as others are high
                 client.camera.fov = 2.0 * math.atan(math.tan(0.5 * _FIELD_OF_VIEW) / aspect)
-            ends[client.client_id] = begin(client)
+            end = begin(client)
+            with changing:
+                already_gone = ends.setdefault(client.client_id, end) is not end
+            if already_gone:
+                del ends[client.client_id]
+                end()
 
         def gone(client: Any) -> None:
-            if (end := ends.pop(client.client_id, None)) is not None:
+            with changing:
+                end = ends.setdefault(client.client_id, _nothing)
+            if end is not _nothing:
+                del ends[client.client_id]
                 end()
 
         self._server.on_client_connect(connected)
         self._server.on_client_disconnect(gone)
+
+
+def _nothing() -> None:
+    """End of what has not begun."""
 
 
 def _check_address(host: str) -> None:
