@@ -1,29 +1,46 @@
-"""Circuit of a board: the values of its parts for one sensor, and what a scene must say about it."""
+"""Circuit of a board: its parts and nets for one sensor, and what a scene must say about it.
+
+Every foil wire has a clamp, a bead or a resistor, and a capacitor. Switches, not the controller's pins, join the
+electrodes to the rail and to ground. The amplifier's reference is above 0 V, so that its offset shows whatever its
+sign. What the parts are and may do is in parts.toml; all that a builder needs is made from the list of components.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.electronics import SENSE_GAIN, LeadOhms, shunt_ohms
 from coneskin.skin.sensor import Sensor
 
-from .boards import BOARD_FACTS, BUILT_IN, Board, BoardFacts, Converter, boards, converters
+from .boards import BOARD_FACTS, BUILT_IN, Board, BoardFacts, Converter, boards, converters, firmware_folder
 
-_SWITCH_OHMS = 2.0  # of an analog switch
-_WIRE_OHMS = 1.0  # of the wire of an electrode
+_WIRE_OHMS = 1.0  # of the wire of an electrode, with bead, plug and foil
 _QUIET_BITS = 12  # with fewer, a converter without noise of its own reads the same count for ever
 _EXTRA_BITS = 1  # that the sketch's usual setting adds to the converter's: two conversions for a reading
+_BIAS_SHARE = 127.0 / 10127.0  # of 3.3 V, at the amplifier's reference pin
+_INPUT_OHMS = 470e3  # 10 nA of a warm clamp lift a guide that floats by 5 mV; over 10 Mohm it would be 100 mV
+_FIXED_VOLTS = 2.5  # of the cheap regulator
+_LEAST_CHIP_SHUNT = 10.0  # ohm; below, a shunt is a part of its own
+WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
+    *(("E_A", "white"), ("S_A", "brown"), ("E_B", "green"), ("S_B", "yellow"), ("E_C", "grey"), ("S_C", "pink")),
+    *(("E_D", "blue"), ("S_D", "red"), ("GND", "black, violet"), ("SHIELD", "braid, here only")),
+)
 
 
-class Part(NamedTuple):
-    """A line of the bill of materials."""
+class Component(NamedTuple):
+    """One part on the board."""
 
-    number: int
-    what: str
-    value: str
-    where: str
+    name: str  #: such as R12
+    part: str  #: its table in parts.toml
+    value: str  #: such as "10 kohm"; empty where the part says all
+    group: str  #: what it belongs to, for the drawing
+    pins: Mapping[str, str]  #: pin -> net
 
 
 class BoardCircuit(NamedTuple):
@@ -50,7 +67,9 @@ class BoardCircuit(NamedTuple):
             "lead_ohm": [float(f"{ohms:g}") for ohms in parts.lead_ohms],
             "supply_v": parts.supply_volts,
             "pulldown_ohm": parts.pulldown_ohms,
+            "input_ohm": parts.input_ohms,
             "current_full_scale_ma": round(1e3 * parts.current_full_scale, 4),
+            "current_zero_ma": round(1e3 * parts.current_zero, 6),
         }
         return found if self.converter is None else {**found, "adc_v": parts.adc_volts}
 
@@ -68,26 +87,61 @@ class BoardCircuit(NamedTuple):
         return found
 
     @property
-    def parts(self) -> list[Part]:
-        """The bill of materials."""
-        parts = self.sensor.electronics
-        found = [
-            Part(1, "board", self.facts.title, ""),
-            Part(1, "voltage regulator, fixed, 50 mA or more", f"{parts.supply_volts:g} V", "from 3.3 V or 5 V"),
-            Part(1, "shunt, 1 %", f"{self.shunt_ohms:.3g} ohm", "between the regulator and the rail"),
-            Part(1, "current-sense amplifier", f"{SENSE_GAIN:g} V/V", "over the shunt, fed by 3.3 V"),
-            Part(4, "analog switch, closed by a high gate", f"{_SWITCH_OHMS:g} ohm or less", "rail to A, B, C, D"),
-            Part(4, "resistor", "100 kohm", "each gate of a switch to ground: open while the board starts"),
-            Part(2, "resistor, 1 %", ohms_text(parts.pulldown_ohms), "C and D to their pull-down pins"),
-            Part(4, "resistor", ohms_text(parts.input_ohms), "A, B, C, D to ground, at the channels"),
-            Part(1, "capacitor", "1 uF", "regulator's output to ground, before the shunt"),
+    def components(self) -> list[Component]:
+        """Everything on the board but the board itself, in order."""
+        return list(_components(self))
+
+    def part_list(self) -> str:
+        """Return the bill of materials as CSV, a line for all alike, with a price for all of them [EUR]."""
+        catalog, lines = part_catalog(), io.StringIO()
+        alike: dict[tuple[str, str], list[str]] = {}
+        for component in [*self.components, Component("W1", "cable", "", "", {})]:
+            alike.setdefault((component.part, component.value), []).append(component.name)
+        rows = csv.writer(lines, lineterminator="\n")
+        rows.writerow(("count", "names", "what", "value", "number", "second source", "EUR", "data sheet"))
+        rows.writerow((1, "A1", self.facts.title, "", "", "", "", ""))
+        for (part, value), names in alike.items():
+            row = catalog[part]
+            price = f"{len(names) * row['price']:.1f}"
+            rows.writerow(
+                (len(names), " ".join(names), row["what"], value, row["number"], row["second"], price, row["source"])
+            )
+        return lines.getvalue()
+
+    def kicad_netlist(self) -> str:
+        """Return the netlist that KiCad's layout reads."""
+        catalog = part_catalog()
+        nets: dict[str, list[str]] = {}
+        found: list[str] = []
+        for name, part, value, _, pins in self.components:
+            found.append(f'    (comp (ref "{name}") (value "{value or catalog[part]["number"]}"))')
+            for pin, net in pins.items():
+                nets.setdefault(net, []).append(f'(node (ref "{name}") (pin "{pin}"))')
+        for pin, net in self.pins.items():
+            nets.setdefault(net, []).append(f'(node (ref "A1") (pin "{pin}"))')
+        found = [f'    (comp (ref "A1") (value "{self.facts.title}"))', *found]
+        listed = [
+            f'    (net (code "{n}") (name "{net}") {" ".join(at)})' for n, (net, at) in enumerate(nets.items(), 1)
         ]
+        return "\n".join(['(export (version "E")', "  (components", *found, "  )", "  (nets", *listed, "  ))", ""])
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """Pins of the board -> nets."""
+        board, facts = self.board, self.facts
+        found = {facts.five_volts: "5V", "3V3": "3V3", "GND": "GND"}
+        if facts.logic_volts > 3.3 and self.converter is None:
+            found["AREF"] = "3V3"
         if self.converter is not None:
-            part, name = "converter, address pin to ground (0x48) and to its supply (0x49)", self.converter.name.upper()
-            found.append(Part(2, part, name, "I2C pins of the board; fed by 5 V, or 3.3 V"))
-        if self.board.common:
-            found.append(Part(1, "analog multiplexer, 8 to 1", "", f"six channels to {self.board.common}"))
-        return found
+            found |= {"SDA": "SDA", "SCL": "SCL"}
+        elif board.common:
+            found |= {board.common: "MUX", **{pin: f"MUX_{k}" for k, pin in enumerate(board.select)}}
+        else:
+            found |= dict(zip(board.sense, ("ADC_A", "ADC_B", "ADC_C", "ADC_D"), strict=True))
+            found |= {board.current: "ADC_I", board.supply: "ADC_S"}
+        for pins, net in ((board.rail, "HIGH_"), (board.ground, "LOW_")):
+            found |= {pin: net + name for pin, name in zip(pins, "ABCD", strict=True)}
+        return found | {pin: f"DOWN_{name}" for pin, name in zip(board.pull_down, "CD", strict=True)}
 
     @property
     def scene_lines(self) -> str:
@@ -135,35 +189,128 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     if name not in table:
         raise SensorError(f"board must be one of {', '.join(table)}, got {name!r}")
     board, facts = table[name], BOARD_FACTS[name]
-    driven = _WIRE_OHMS + _SWITCH_OHMS
-    ground = _WIRE_OHMS + facts.pin_ohms
-    leads = LeadOhms(
-        *((ground, driven) if sensor.b_positive else (driven, ground)),
-        *((driven, ground) if sensor.c_positive else (ground, driven)),
-    )
+    switch, limits = switch_for(sensor)
+    if switch == "low_switch" and facts.logic_volts > 3.3:
+        raise SensorError(
+            f"{sensor.name} needs switches of half an ohm, whose inputs stand 3.3 V, and the pins of a {facts.title} "
+            f"have {facts.logic_volts:g} V: take another board"
+        )
     shunt = shunt_ohms(sensor.electronics)
-    other = None
-    if converter == BUILT_IN:
-        electronics = replace(sensor.electronics, adc_bits=board.bits + _EXTRA_BITS, lead_ohms=leads)
-    else:
+    bits, volts, other = board.bits + _EXTRA_BITS, sensor.electronics.adc_volts, None
+    if converter == BUILT_IN and not facts.own_converter:
+        raise SensorError(
+            f"the converter of an {facts.title} is dead below 0.14 V and bent by per cents, and places touches "
+            "centimetres off: give it a converter, as with --converter ads1115"
+        )
+    if converter != BUILT_IN:
         known = converters()
         if converter not in known:
             raise SensorError(f"converter must be one of {', '.join([BUILT_IN, *known])}, got {converter!r}")
         other = known[converter]
         *electrodes, current, rail = other.channels
         board = board._replace(sense=tuple(electrodes), current=current, supply=rail, select=(), common="")
-        electronics = replace(
-            sensor.electronics,
-            adc_bits=other.bits + other.extra_bits,
-            adc_volts=other.volts,
-            current_full_scale=other.volts / (SENSE_GAIN * shunt),  # by the same shunt
-            lead_ohms=leads,
-        )
+        bits, volts = other.bits + other.extra_bits, other.volts
+    ampere = 1.0 / (SENSE_GAIN * shunt)  # A for a volt
+    electronics = replace(
+        sensor.electronics,
+        adc_bits=bits,
+        adc_volts=volts,
+        current_full_scale=volts * ampere,
+        current_zero=3.3 * _BIAS_SHARE * ampere,
+        lead_ohms=LeadOhms.equal(_WIRE_OHMS + limits["on_ohm"][0]),
+        input_ohms=max(_INPUT_OHMS, 10.0 * sensor.electronics.pulldown_ohms),
+    )
     fitted = replace(sensor, electronics=electronics)
-    largest = max(fitted.radial_amperes, fitted.angular_amperes)
-    if largest > facts.pin_amperes:
+    largest, most = max(fitted.radial_amperes, fitted.angular_amperes), 1e-3 * limits["most_ma"][1]
+    if largest > most:
         raise SensorError(
-            f"the pins of a {facts.title} carry at most {1e3 * facts.pin_amperes:g} mA, and {sensor.name} draws "
-            f"{1e3 * largest:.3g} mA: give the sheets a higher resistance, a lower supply_v, or take another board"
+            f"the switches of a board carry at most {1e3 * most:g} mA, and {sensor.name} draws "
+            f"{1e3 * largest:.3g} mA: give the sheets a higher resistance, or a lower supply_v"
         )
     return BoardCircuit(board, facts, fitted, shunt, other)
+
+
+def part_catalog() -> dict[str, Any]:
+    """Return the tables of parts.toml by name."""
+    return tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
+
+
+def switch_for(sensor: Sensor) -> tuple[str, dict[str, list[float]]]:
+    """Return the switches for a sensor's current, by their table in parts.toml, and their limits."""
+    catalog, drawn = part_catalog(), 1e3 * max(sensor.radial_amperes, sensor.angular_amperes)
+    name = "switch" if drawn <= catalog["switch"]["limits"]["most_ma"][1] else "low_switch"
+    return name, catalog[name]["limits"]
+
+
+def _components(circuit: BoardCircuit) -> Iterator[Component]:
+    parts, shunt, converter = circuit.sensor.electronics, circuit.shunt_ohms, circuit.converter
+    count: dict[str, int] = {}
+    group = "supply and current"
+
+    def part(letter: str, kind: str, value: str = "", **pins: str) -> Component:
+        count[letter] = count.get(letter, 0) + 1
+        return Component(f"{letter}{count[letter]}", kind, value, group, {k.strip("_"): net for k, net in pins.items()})
+
+    def two(letter: str, kind: str, value: str, one: str, other: str) -> Component:
+        return part(letter, kind, value, _1=one, _2=other)
+
+    yield two("C", "decoupling", "10 uF", "5V", "GND")
+    if parts.supply_volts == _FIXED_VOLTS:
+        yield part("U", "regulator", IN="5V", OUT="REG", GND="GND")
+    else:
+        yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND")
+        yield two("R", "precise", ohms_text(1e4 * parts.supply_volts), "SET", "GND")
+        yield two("C", "decoupling", "4.7 uF", "SET", "GND")
+    yield two("C", "decoupling", "10 uF", "REG", "GND")
+    yield two("R", "precise" if shunt >= _LEAST_CHIP_SHUNT else "low_shunt", f"{shunt:.3g} ohm", "REG", "RAIL")
+    amplifier = {"IN+": "REG", "IN-": "RAIL", "REF": "BIAS", "OUT": "AMP", "VS": "3V3", "GND": "GND"}
+    yield part("U", "amplifier", **amplifier)
+    yield two("C", "decoupling", "100 nF", "3V3", "GND")
+    yield two("R", "precise", "10 kohm", "3V3", "BIAS")
+    yield two("R", "precise", "127 ohm", "BIAS", "GND")
+    yield two("C", "decoupling", "1 uF", "BIAS", "GND")
+    for net, to in (("AMP", "ADC_I"), ("RAIL", "ADC_S")):
+        yield two("R", "resistor", "1 kohm", net, to)
+        yield two("C", "filter", "470 pF", to, "GND")
+    group = "switches"
+    switch = switch_for(circuit.sensor)[0]
+    for common, gate in (("RAIL", "HIGH_"), ("GND", "LOW_")):
+        channels = {f"S{k}": common for k in (1, 2, 3, 4)} | {f"D{k}": f"DRIVE_{e}" for k, e in enumerate("ABCD", 1)}
+        gates = {f"SEL{k}": gate + e for k, e in enumerate("ABCD", 1)}
+        yield part("U", switch, **channels, **gates, VDD="3V3" if switch == "low_switch" else "5V", GND="GND")
+        yield two("C", "decoupling", "100 nF", "3V3" if switch == "low_switch" else "5V", "GND")
+        for e in "ABCD":
+            yield two("R", "resistor", "100 kohm", gate + e, "GND")
+    group = "clamps"
+    for wire in "ES":
+        yield part("U", "clamp", **{f"IO{k}": f"{wire}_{e}" for k, e in enumerate("ABCD", 1)}, GND="GND")
+    for e in "ABCD":
+        group = f"electrode {e}"
+        yield two("FB", "bead", "", f"DRIVE_{e}", f"E_{e}")
+        yield two("C", "filter", "220 pF", f"E_{e}", "GND")
+        yield two("R", "precise", ohms_text(parts.input_ohms), f"S_{e}", "GND")
+        yield two("R", "resistor", "1 kohm", f"S_{e}", f"ADC_{e}")
+        yield two("C", "filter", "470 pF", f"ADC_{e}", "GND")
+        if e in "CD":
+            yield two("R", "precise", ohms_text(parts.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
+    group = "converter"
+    inputs = [f"ADC_{name}" for name in "ABCDIS"]
+    if converter is not None:
+        supply = "5V" if circuit.facts.logic_volts > 3.3 else "3V3"
+        for address, nets in (("GND", inputs[:4]), (supply, inputs[4:])):
+            channels = {f"AIN{k}": net for k, net in enumerate(nets)}
+            yield part("U", converter.name, **channels, ADDR=address, SDA="SDA", SCL="SCL", VDD=supply, GND="GND")
+            yield two("C", "decoupling", "100 nF", supply, "GND")
+        for net in ("SDA", "SCL"):
+            yield two("R", "resistor", "2.2 kohm", supply, net)
+    elif circuit.board.common:
+        numbers = (*circuit.board.sense, circuit.board.current, circuit.board.supply)
+        channels = {f"S{int(n) + 1}": net for n, net in zip(numbers, inputs, strict=True)}
+        lines = {f"A{k}": f"MUX_{k}" for k in (0, 1, 2)}
+        yield part("U", "multiplexer", **channels, **lines, D="MUX", EN="3V3", VDD="3V3", GND="GND")
+        yield two("C", "decoupling", "100 nF", "3V3", "GND")
+    group = "connector and test points"
+    yield part("J", "connector", **{f"_{k}": net for k, (net, _) in enumerate(WIRES, 1)})
+    yield two("R", "resistor", "0 ohm", "SHIELD", "GND")
+    for net in ("GND", "5V", "3V3", "RAIL", "AMP", "BIAS"):
+        yield part("TP", "test_point", _1=net)

@@ -1,37 +1,55 @@
-"""Page of a board: pins, parts, flashing and scene, as Markdown; and its wiring diagram, as SVG."""
+"""Page of a board: pins, cable, first steps and scene, as Markdown; and its drawing, as SVG."""
 
 from __future__ import annotations
 
 from xml.sax.saxutils import escape
 
-from coneskin.skin.electronics import SENSE_GAIN
-
-from .board_circuit import BoardCircuit, ohms_text
+from .board_circuit import WIRES, BoardCircuit, Component, part_catalog
 
 
 def board_page(circuit: BoardCircuit) -> str:
     """Return the page that stands beside the sketch."""
     board, facts, sensor = circuit.board, circuit.facts, circuit.sensor
     parts = sensor.electronics
+    count, volt = parts.full_count, parts.full_count / parts.adc_volts
+    zero, bias = parts.count_amperes(0.0), 50.0 * parts.current_zero * circuit.shunt_ohms
     lines = [
         f"# {facts.title} for {sensor.name}",
         "",
-        f"Wiring: wiring.svg. {_remark(circuit)}Frames per second: {_rate(circuit)}. This is no safety-rated device.",
+        f"Drawing: wiring.svg. Parts, prices, second sources: parts.csv. For a layout in KiCad: board.net. "
+        f"{_remark(circuit)}Frames per second: {_rate(circuit)}. This is no safety-rated device.",
         "",
         f"Drive currents: {1e3 * sensor.radial_amperes:.3g} mA from {_ends(sensor.b_positive, 'B', 'A')}, "
         f"{1e3 * sensor.angular_amperes:.3g} mA from {_ends(sensor.c_positive, 'C', 'D')}; full scale "
         f"{1e3 * parts.current_full_scale:.3g} mA.",
         "",
-        "| pin | to |",
+        "| pin | net of the drawing |",
         "|---|---|",
-        *(f"| {pin} | {to} |" for pin, to in _pins(circuit)),
+        *(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
         "",
-        "| count | part | value | where |",
-        "|---|---|---|---|",
-        *(f"| {part.number} | {part.what} | {part.value} | {part.where} |" for part in circuit.parts),
+        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else:",
         "",
-        "Flash:",
+        "| pole | net | wire |",
+        "|---|---|---|",
+        *(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
         "",
+        "First steps. Each number must be there before the next:",
+        "",
+        "| step | what should read |",
+        "|---|---|",
+        "| no sensor, no board in its socket: 5V, 3V3 to GND | more than 1 kohm, either way |",
+        f"| powered, no sensor: RAIL | {parts.supply_volts:g} V, 2 % |",
+        f"| BIAS, AMP | {bias * 1e3:.0f} mV both, within 5 mV |",
+        "| flashed, no sensor: `coneskin monitor` | frames; both drive currents within 2 counts of the zero |",
+        f"| the zero, `touch_current` | {zero} counts of {count}, {round(0.012 * count)} more or less |",
+        f"| `touch_supply` | {parts.supply_volts * volt:.0f} counts |",
+        f"| sensor plugged in: `radial_current` | {parts.count_amperes(sensor.radial_amperes)} counts |",
+        f"| `angular_current` | {parts.count_amperes(sensor.angular_amperes)} counts |",
+        f"| the six guides, untouched | under {max(2, count // 100)} counts |",
+        "",
+        "Flash (the first line where the compiler is from Debian's packages):",
+        "",
+        f"    coneskin firmware SENSOR --board {board.name} --to FOLDER --flash /dev/ttyACM0",
         f"    arduino-cli compile --upload --fqbn {facts.target} --port /dev/ttyACM0 coneskin",
         "",
         "The scene:",
@@ -47,8 +65,6 @@ def board_page(circuit: BoardCircuit) -> str:
             *(f"    {line}" for line in settings),
             "",
         ]
-    if board.common:
-        lines += [f"Address of the multiplexer, lowest bit first: pins {', '.join(board.select)}.", ""]
     return "\n".join(lines)
 
 
@@ -69,23 +85,6 @@ def _ends(normal: bool, first: str, second: str) -> str:
     return f"{first} to {second}" if normal else f"{second} to {first}"
 
 
-def _pins(circuit: BoardCircuit) -> list[tuple[str, str]]:
-    board = circuit.board
-    channel = "channel {} of the multiplexer" if board.common else "{}"
-    found = [
-        (channel.format(pin), f"electrode {e}, by a wire of its own")
-        for e, pin in zip("ABCD", board.sense, strict=True)
-    ]
-    found += [(channel.format(board.current), "output of the current-sense amplifier")]
-    found += [(channel.format(board.supply), "the rail, behind the shunt")]
-    if circuit.converter is not None:
-        found += [("SDA, SCL", f"both {circuit.converter.name.upper()}, with 2.2 kohm each to their supply")]
-    found += [(pin, f"gate of the switch from the rail to {e}") for e, pin in zip("ABCD", board.rail, strict=True)]
-    found += [(pin, f"{e} itself: drives it to ground") for e, pin in zip("ABCD", board.ground, strict=True)]
-    found += [(pin, f"pull-down resistor of {e}") for e, pin in zip("CD", board.pull_down, strict=True)]
-    return found
-
-
 def _settings(circuit: BoardCircuit) -> list[str]:
     """Return the settings that are not the sketch's own."""
     sensor = circuit.sensor
@@ -100,126 +99,76 @@ def _settings(circuit: BoardCircuit) -> list[str]:
     return [f"{name}={value}" for name, (value, usual) in wanted.items() if value != usual]
 
 
-_WIDTH, _HEIGHT = 1080, 840
-_BOARD, _SWITCH, _RAIL, _SHEET = 230, 430, 560, 880  # x of the board's edge, the switches, the rail, the electrodes
-_FIRST, _ROW = 230, 150  # y of electrode A, and from one to the next
-_ELECTRODE_PLACES = "upper sheet, end 2", "upper sheet, end 1", "lower sheet, phi = wrap", "lower sheet, phi = 0"
+_WIDTH, _FIRST_ROW, _ROW_HEIGHT, _GROUP_GAP = 1520, 100, 15, 26  # of the drawing; of a row, between two groups
+_COLUMN_GROUPS = (  # x, and what stands there from top to bottom
+    (410, ("supply and current", "converter")),
+    (730, ("switches", "clamps")),
+    (1050, ("electrode A", "electrode B", "electrode C")),
+    (1370, ("electrode D", "connector and test points")),
+)
+_NET_COLOURS = {"GND": "#555", "SHIELD": "#555", "5V": "#b02a1a", "3V3": "#b02a1a", "REG": "#b02a1a", "RAIL": "#b02a1a"}
 _SVG_STYLE = (
-    "text{font:14px sans-serif;fill:#222}.small{font-size:12px;fill:#555}.title{font-size:18px;font-weight:bold}"
-    "path,rect,circle{fill:none;stroke:#222;stroke-width:1.5}.part{fill:#fff}.rail{stroke:#b02a1a;stroke-width:2.5}"
-    ".sense{stroke:#1a5cb0}.dot{fill:#222}.body{fill:#eef3f6}"
+    "text{font:11px sans-serif;fill:#222}.title{font-size:18px;font-weight:bold}.group{font-size:14px;font-weight:bold}"
+    "path,rect{fill:none;stroke:#222;stroke-width:1.2}rect{fill:#eef3f6}.name{font-weight:bold}"
 )
 
 
 def wiring_diagram(circuit: BoardCircuit) -> str:
-    """Return the diagram."""
-    board, parts = circuit.board, circuit.sensor.electronics
-    out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img">',
+    """Return the drawing: every part with its pins, and at each pin the name of its net; equal names are joined."""
+    catalog, lowest = part_catalog(), 0
+    out: list[str] = []
+    board = Component("A1", "", circuit.facts.title, "", circuit.pins)
+    columns: list[tuple[int, list[tuple[str, list[Component]]]]] = [(130, [("the board", [board])])]
+    for x, groups in _COLUMN_GROUPS:
+        parts = [(group, [c for c in circuit.components if c.group == group]) for group in groups]
+        columns.append((x, [each for each in parts if each[1]]))
+    for x, stack in columns:
+        y = _FIRST_ROW
+        for group, components in stack:
+            out.append(_text(x - 110, y, group, "group"))
+            y += 12
+            for component in components:
+                value = component.value or catalog[component.part]["number"].split()[-1]
+                drawn, height = _drawn(x, y, component, value)
+                out += drawn
+                y += height
+            y += _GROUP_GAP
+        lowest = max(lowest, y)
+    head = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {lowest + 10}" role="img">',
         f"<style>{_SVG_STYLE}</style>",
-        f'<rect width="{_WIDTH}" height="{_HEIGHT}" style="fill:#fff;stroke:none"/>',
-        _text(30, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
-        _text(30, 58, "red: rail; blue: wires that only read, each to its electrode; all grounds are joined", "small"),
-        f'<rect class="body" x="30" y="80" width="{_BOARD - 30}" height="{_HEIGHT - 110}" rx="8"/>',
-        *_supply(circuit),
-        *(line for row in range(4) for line in _electrode(circuit, row)),
-    ]
-    if board.common:
-        out.append(_text(40, _HEIGHT - 60, "ch: channel of the multiplexer,", "small"))
-        out.append(_text(40, _HEIGHT - 44, f"output {board.common}, address {', '.join(board.select)}", "small"))
-    out.append(_text(_RAIL + 12, _HEIGHT - 40, f"each channel: {ohms_text(parts.input_ohms)} to ground", "small"))
-    return "\n".join([*out, "</svg>", ""])
-
-
-def _supply(circuit: BoardCircuit) -> list[str]:
-    """Draw regulator, shunt, amplifier and rail."""
-    board, parts = circuit.board, circuit.sensor.electronics
-    bottom = _FIRST + 3 * _ROW
-    return [
-        *_pin(
-            circuit,
-            110,
-            "3.3 V and AREF" if "AREF" in circuit.facts.remark and circuit.converter is None else "3.3 V",
-            "",
+        f'<rect width="{_WIDTH}" height="{lowest + 10}" style="fill:#fff;stroke:none"/>',
+        _text(20, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
+        _text(
+            20, 58, "Pins with the same word are joined. E drives an electrode, S reads it: two wires, a twisted pair."
         ),
-        _line((_BOARD, 110), (_BOARD + 60, 110)),
-        _box(_BOARD + 60, 92, 100, 36, f"{parts.supply_volts:g} V regulator"),
-        _line((_BOARD + 160, 110), (_RAIL - 90, 110)),
-        _box(_RAIL - 90, 100, 60, 20, ""),
-        _text(_RAIL - 100, 92, f"shunt {circuit.shunt_ohms:.3g} ohm"),
-        _line((_RAIL - 30, 110), (_RAIL, 110), (_RAIL, bottom), css="rail"),
-        *_pin(circuit, 150, "current", board.current),
-        _box(_RAIL - 110, 134, 100, 32, f"x {SENSE_GAIN:g}"),
-        _line((_RAIL - 100, 110), (_RAIL - 100, 134)),
-        _line((_RAIL - 20, 110), (_RAIL - 20, 134)),
-        _dot(_RAIL - 100, 110),
-        _dot(_RAIL - 20, 110),
-        _line((_RAIL - 110, 150), (_BOARD, 150), css="sense"),
-        *_pin(circuit, 180, "rail", board.supply),
-        _line((_BOARD, 180), (_RAIL, 180), css="sense"),
-        _dot(_RAIL, 180),
-        _text(_RAIL + 10, 130, "rail"),
     ]
+    return "\n".join([*head, *out, "</svg>", ""])
 
 
-def _electrode(circuit: BoardCircuit, row: int) -> list[str]:
-    """Draw what one electrode is wired to."""
-    board, name = circuit.board, "ABCD"[row]
-    y = _FIRST + row * _ROW
-    wire = _RAIL + 150  # x where the driving wires meet
+def _drawn(x: int, y: int, part: Component, value: str) -> tuple[list[str], int]:
+    """Draw a part around x from y on; return it, and how high it is. Of two pins it is a row, else a box."""
+    pins = list(part.pins.items())
+    if len(pins) < 3:
+        ends = [_net(x - 74, y + 12, pins[0][1], "end"), *(_net(x + 74, y + 12, net, "start") for _, net in pins[1:])]
+        body = f'<rect x="{x - 70}" y="{y + 1}" width="140" height="{_ROW_HEIGHT - 1}"/>'
+        return [body, _text(x, y + 12, f"{part.name} {value}".strip(), "", "middle"), *ends], _ROW_HEIGHT + 2
+    rows = (len(pins) + 1) // 2
     out = [
-        _line((_RAIL, y), (_RAIL + 40, y), css="rail"),
-        _dot(_RAIL, y),
-        _box(_RAIL + 40, y - 14, 70, 28, "switch"),
-        _line((_RAIL + 110, y), (_SHEET, y)),
-        *_pin(circuit, y - 22, f"gate {name}", board.rail[row]),
-        _line((_BOARD, y - 22), (_SWITCH, y - 22), (_RAIL + 75, y - 22), (_RAIL + 75, y - 14)),
-        _text(_BOARD + 40, y - 27, "100 kohm to ground", "small"),
-        *_pin(circuit, y + 26, f"ground {name}", board.ground[row]),
-        _line((_BOARD, y + 26), (wire, y + 26), (wire, y)),
-        _dot(wire, y),
+        f'<rect x="{x - 70}" y="{y + 16}" width="140" height="{rows * _ROW_HEIGHT + 4}"/>',
+        _text(x, y + 12, f"{part.name} {value}", "name", "middle"),
     ]
-    if name in "CD":
-        out += [
-            *_pin(circuit, y + 52, f"pull-down {name}", board.pull_down[row - 2]),
-            _line((_BOARD, y + 52), (_BOARD + 60, y + 52)),
-            _box(_BOARD + 60, y + 42, 90, 20, ohms_text(circuit.sensor.electronics.pulldown_ohms)),
-            _line((_BOARD + 150, y + 52), (wire + 30, y + 52), (wire + 30, y)),
-            _dot(wire + 30, y),
-        ]
-    out += [
-        *_pin(circuit, y + 78, f"sense {name}", board.sense[row]),
-        _line((_BOARD, y + 78), (_SHEET - 30, y + 78), (_SHEET - 30, y + 12), (_SHEET, y + 12), css="sense"),
-        f'<rect class="body" x="{_SHEET}" y="{y - 24}" width="175" height="56" rx="4"/>',
-        _text(_SHEET + 12, y - 2, f"electrode {name}"),
-        _text(_SHEET + 12, y + 18, _ELECTRODE_PLACES[row], "small"),
-    ]
-    return out
+    for k, (pin, net) in enumerate(pins):
+        left, at = k < rows, y + 16 + _ROW_HEIGHT * (k % rows + 1) - 2
+        out.append(_text(x - 66 if left else x + 66, at, pin, "", "start" if left else "end"))
+        out.append(_net(x - 74 if left else x + 74, at, net, "end" if left else "start"))
+    return out, rows * _ROW_HEIGHT + 32
 
 
-def _pin(circuit: BoardCircuit, y: int, purpose: str, pin: str) -> list[str]:
-    """Draw a pin at the board's edge, with what it is for."""
-    channels = {*circuit.board.sense, circuit.board.current, circuit.board.supply}
-    analog = purpose.split()[0] in ("sense", "current", "rail")
-    shown = f"ch {pin}" if circuit.board.common and analog and pin in channels else pin
-    label = _text(44, y + 5, purpose, "small")
-    return [label, f'<text x="{_BOARD - 10}" y="{y + 5}" text-anchor="end">{escape(shown)}</text>', _dot(_BOARD, y)]
+def _net(x: int, y: int, net: str, anchor: str) -> str:
+    colour = _NET_COLOURS.get(net, "#1a5cb0" if net.startswith(("S_", "ADC_")) else "#1a7a3a")
+    return f'<text x="{x}" y="{y}" text-anchor="{anchor}" style="fill:{colour}">{escape(net)}</text>'
 
 
-def _text(x: int, y: int, words: str, css: str = "") -> str:
-    return f'<text x="{x}" y="{y}"{f" class={chr(34)}{css}{chr(34)}" if css else ""}>{escape(words)}</text>'
-
-
-def _line(*points: tuple[int, int], css: str = "") -> str:
-    path = "M" + " L".join(f"{x} {y}" for x, y in points)
-    return f'<path d="{path}"{f" class={chr(34)}{css}{chr(34)}" if css else ""}/>'
-
-
-def _box(x: int, y: int, width: int, height: int, words: str) -> str:
-    rect = f'<rect class="part" x="{x}" y="{y}" width="{width}" height="{height}"/>'
-    at = f'x="{x + width // 2}" y="{y + height // 2 + 4}" text-anchor="middle" class="small"'
-    return rect + (f"<text {at}>{escape(words)}</text>" if words else "")
-
-
-def _dot(x: int, y: int) -> str:
-    return f'<circle class="dot" cx="{x}" cy="{y}" r="3"/>'
+def _text(x: int, y: int, words: str, css: str = "", anchor: str = "start") -> str:
+    return f'<text x="{x}" y="{y}" class="{css}" text-anchor="{anchor}">{escape(words)}</text>'

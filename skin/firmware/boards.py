@@ -15,11 +15,12 @@ class BoardFacts(NamedTuple):
 
     title: str
     target: str  #: name of the board for ``arduino-cli``
-    pin_ohms: float  #: resistance of a pin that drives to ground [ohm], typical
-    pin_amperes: float  #: what such a pin may carry for good [A]
+    logic_volts: float  #: of its pins [V]
+    five_volts: str  #: its pin that gives 5 V
     clock_ppm: int  #: how far its clock may be off [ppm]
     rate: str  #: frames per second with the usual settings
     remark: str
+    own_converter: bool = True  #: good enough for a sensor
 
 
 #: Board, as the sketch's table names it -> its facts.
@@ -27,8 +28,8 @@ BOARD_FACTS: dict[str, BoardFacts] = {
     "uno": BoardFacts(
         "Arduino Uno R3 or Nano",
         "arduino:avr:uno",
-        25.0,
-        0.02,
+        5.0,
+        "5V",
         5000,
         "200, measured in emulation",
         "wire 3.3 V to AREF; its clock is a ceramic resonator",
@@ -36,8 +37,8 @@ BOARD_FACTS: dict[str, BoardFacts] = {
     "nano-every": BoardFacts(
         "Arduino Nano Every",
         "arduino:megaavr:nona4809",
-        30.0,
-        0.015,
+        5.0,
+        "5V",
         30_000,
         "200, an estimate",
         "wire 3.3 V to AREF; its clock is the controller's own oscillator",
@@ -45,8 +46,8 @@ BOARD_FACTS: dict[str, BoardFacts] = {
     "pico": BoardFacts(
         "Raspberry Pi Pico",
         "rp2040:rp2040:rpipico",
-        40.0,
-        0.004,
+        3.3,
+        "VBUS",
         100,
         "200, at most about 500: an estimate",
         "has three channels: an analog multiplexer brings the six to one of them",
@@ -54,8 +55,8 @@ BOARD_FACTS: dict[str, BoardFacts] = {
     "teensy": BoardFacts(
         "Teensy 4.0",
         "teensy:avr:teensy40",
-        40.0,
-        0.004,
+        3.3,
+        "VIN",
         100,
         "200, at most 1000: an estimate",
         "its pins do not stand more than 3.3 V",
@@ -63,11 +64,12 @@ BOARD_FACTS: dict[str, BoardFacts] = {
     "esp32": BoardFacts(
         "ESP32 DevKit",
         "esp32:esp32:esp32",
-        40.0,
-        0.01,
+        3.3,
+        "VIN",
         100,
-        "200, at most about 500: an estimate",
-        "its converter is off by per cents near both ends: calibrate, or take another board",
+        "40, an estimate",
+        "",
+        own_converter=False,
     ),
 }
 

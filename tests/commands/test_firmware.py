@@ -1,16 +1,22 @@
 """Command ``coneskin firmware``: what it writes for each board."""
 
+import csv
 import re
 import xml.etree.ElementTree as ET
+from collections import defaultdict
 
 import pytest
 
 from coneskin.cli import main
+from coneskin.geometry.frustum import Frustum
 from coneskin.scene.reader import parse_scene
-from coneskin.skin.firmware.boards import BOARD_FACTS, boards, converters, firmware_folder
+from coneskin.skin.firmware.board_circuit import board_circuit, part_catalog
+from coneskin.skin.firmware.boards import BOARD_FACTS, BUILT_IN, boards, converters, firmware_folder
+from coneskin.skin.sensor import Sensor
 
 CONE = "radius1_mm = 37.5\nradius2_mm = 37.5\nheight_mm = 240\nwrap_deg = 350\n"
-each_board = pytest.mark.parametrize("board", list(BOARD_FACTS))
+OWN = [name for name, facts in BOARD_FACTS.items() if facts.own_converter]
+each_board = pytest.mark.parametrize("board", OWN)
 
 
 @pytest.fixture
@@ -23,6 +29,10 @@ def sensor_file(tmp_path):
 def write(sensor_file, *options):
     folder = sensor_file.parent / "board"
     return main(["firmware", str(sensor_file), "--to", str(folder), *options]), folder
+
+
+def part_rows(folder):
+    return list(csv.DictReader((folder / "parts.csv").read_text(encoding="utf-8").splitlines()))
 
 
 def test_the_table_of_pins_has_a_row_for_each_board_that_facts_are_known_of():
@@ -48,15 +58,13 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
     row, page = boards()[board], (folder / "board.md").read_text(encoding="utf-8")
     drawn = [text.text for text in ET.parse(folder / "wiring.svg").iter("{http://www.w3.org/2000/svg}text")]
     for pin in [*row.rail, *row.ground, *row.pull_down]:
-        assert drawn.count(pin) == 1
+        assert pin in drawn
         assert f"| {pin} | " in page
-    assert drawn.count("10 kohm") == 2
-    assert "shunt 11.3 ohm" in drawn
-    assert "| shunt, 1 % | 11.3 ohm |" in page
-    counts = {where: int(count) for count, where in re.findall(r"^\| (\d) \|.*\| ([^|]+) \|$", page, re.MULTILINE)}
-    four = ("rail to A, B, C, D", "each gate of a switch to ground: open while the board starts")
-    assert {counts[where] for where in (*four, "A, B, C, D to ground, at the channels")} == {4}
-    assert counts["C and D to their pull-down pins"] == 2
+    parts = {row["names"].split()[0]: row for row in part_rows(folder)}
+    assert parts["R1"]["value"] == "11.3 ohm"
+    assert parts.pop("A1")["what"] == BOARD_FACTS[board].title
+    assert all(row["number"] and row["second source"] and row["data sheet"] for row in parts.values())
+    assert [row["count"] for row in parts.values() if row["value"] == "100 kohm"] == ["8"]
     assert str(folder / "board.md") in capsys.readouterr().out
 
 
@@ -79,10 +87,8 @@ def test_another_converter_is_in_sketch_wiring_page_and_scene(sensor_file, conve
     assert changed == [f"#define CONESKIN_ADS {converter.removeprefix('ads')}"]
     page = (folder / "board.md").read_text(encoding="utf-8")
     drawn = [text.text for text in ET.parse(folder / "wiring.svg").iter("{http://www.w3.org/2000/svg}text")]
-    for channel in converters()[converter].channels:
-        assert drawn.count(channel) == 1
-        assert f"| {channel} | " in page
-    assert f"| 2 | converter, address pin to ground (0x48) and to its supply (0x49) | {converter.upper()} |" in page
+    assert sum(converter.upper() in words for words in drawn) == 2
+    assert [row["count"] for row in part_rows(folder) if converter.upper() in row["number"]] == ["2"]
     assert "AREF" not in page
     lines = re.findall(r"^    (.*)$", page.split("The scene:")[1], re.MULTILINE)
     scene = parse_scene("\n".join(lines).replace("[[link.sensor]]", f'[[link]]\nname = "arm"\n[[link.sensor]]\n{CONE}'))
@@ -100,12 +106,51 @@ def test_settings_of_a_sensor_that_is_another_one_are_on_the_page(sensor_file):
     ]
 
 
-def test_a_current_that_the_pins_do_not_stand_is_refused(sensor_file, capsys):
-    sensor_file.write_text(CONE.replace("240", "36"), encoding="utf-8")
+def test_a_current_that_the_switches_do_not_stand_is_refused(sensor_file, capsys):
+    sensor_file.write_text(CONE + "upper_sheet_ohm = 1\nlower_sheet_ohm = 1\nsupply_v = 1.25\n", encoding="utf-8")
     code, folder = write(sensor_file, "--board", "pico")
     assert code == 1
-    assert "the pins of a Raspberry Pi Pico carry at most 4 mA, and sensor 0/0 draws" in capsys.readouterr().err
+    assert "the switches of a board carry at most 250 mA, and sensor 0/0 draws" in capsys.readouterr().err
     assert not folder.exists()
+
+
+def test_the_converter_of_an_esp32_is_not_offered(sensor_file, capsys):
+    code, folder = write(sensor_file, "--board", "esp32")
+    assert code == 1
+    assert "give it a converter, as with --converter ads1115" in capsys.readouterr().err
+    assert not folder.exists()
+    assert write(sensor_file, "--board", "esp32", "--converter", "ads1115")[0] == 0
+
+
+def test_switches_of_half_an_ohm_are_for_pins_of_3_3_volts(sensor_file, capsys):
+    sensor_file.write_text(CONE + "upper_sheet_ohm = 20\n", encoding="utf-8")
+    assert write(sensor_file)[0] == 1
+    assert "whose inputs stand 3.3 V" in capsys.readouterr().err
+    assert write(sensor_file, "--board", "pico")[0] == 0
+    assert "ADG812" in (sensor_file.parent / "board" / "parts.csv").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("board", "converter"), [*((name, BUILT_IN) for name in OWN), ("esp32", "ads1115")])
+def test_the_netlist_joins_what_belongs_together(board, converter):
+    circuit = board_circuit(board, Sensor(Frustum(0.0375, 0.0375, 0.24, 6.1)), converter)
+    nets = defaultdict(list)
+    for name, part, _, _, pins in circuit.components:
+        assert part in part_catalog()
+        for pin, net in pins.items():
+            nets[net].append((name, part, pin))
+    for pin, net in circuit.pins.items():
+        nets[net].append(("A1", "board", pin))
+    assert {net for net, at in nets.items() if len(at) < 2} == set()  # every net joins something
+    names = [component.name for component in circuit.components]
+    assert len(set(names)) == len(names)
+    for wire in (f"{kind}_{electrode}" for kind in "ES" for electrode in "ABCD"):  # each foil wire is protected
+        parts = [part for _, part, _ in nets[wire]]
+        assert parts.count("clamp") == parts.count("connector") == 1
+        assert {"bead", "resistor"} & set(parts)
+        assert "filter" in [part for _, part, _ in nets[wire if wire[0] == "E" else f"ADC_{wire[-1]}"]]
+    for net in [f"{gate}_{electrode}" for gate in ("HIGH", "LOW") for electrode in "ABCD"]:
+        assert sorted(part for _, part, _ in nets[net]) == ["board", "resistor", "switch"]
+    assert [(part, pin) for _, part, pin in nets["BIAS"] if part == "amplifier"] == [("amplifier", "REF")]
 
 
 def test_a_file_of_the_users_is_not_replaced_unasked(sensor_file, capsys):

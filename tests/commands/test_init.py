@@ -91,7 +91,7 @@ def test_the_scene_says_the_values_of_the_board_that_firmware_was_written_for(he
     assert main(["init", "skin", *words]) == 0
     scene, page = load_scene(here / "scene.toml"), (here / "board" / "board.md").read_text()
     electronics = scene.sensors[0].sensor.electronics
-    assert (electronics.adc_bits, electronics.adc_volts, electronics.lead_ohms[0]) == (15, 4.096, 41.0)
+    assert (electronics.adc_bits, electronics.adc_volts, electronics.lead_ohms[0]) == (15, 4.096, 3.0)
     assert scene.monitoring_limits.skin_silence == 0.1
     assert scene.source is not None
     assert scene.source.settings["baud"] == 921600

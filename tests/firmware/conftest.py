@@ -5,8 +5,8 @@ import math
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.electronics import GivenElectronics, LeadOhms, match_electronics
-from coneskin.skin.sensor import Sensor, sheet_resistances
+from coneskin.skin.firmware.board_circuit import board_circuit
+from coneskin.skin.sensor import Sensor
 from tests.support.firmware.emulated_board import BoardPrograms
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 
@@ -24,6 +24,4 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> BoardPrograms:
 
 @pytest.fixture(scope="session")
 def sensor() -> Sensor:
-    # A and D are driven to ground by a pin of 25 ohm, B and C to the rail by a switch of 2 ohm; 1 ohm of wire each
-    given = GivenElectronics(adc_bits=BITS, lead_ohms=LeadOhms(26.0, 3.0, 3.0, 26.0))
-    return Sensor(CONE, electronics=match_electronics(*sheet_resistances(CONE, 1000.0, 1000.0), given))
+    return board_circuit("uno", Sensor(CONE)).sensor

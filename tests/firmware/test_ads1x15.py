@@ -17,7 +17,7 @@ from tests.support.firmware.firmware_build import build_sketch
 from .conftest import CONE
 
 pytestmark = pytest.mark.long
-TOUCH = ScriptedTouch(1.5, 2.0, 0.1, 2.0, 10.0)
+TOUCH = ScriptedTouch(1.51, 2.0, 0.1, 2.0, 10.0)
 
 
 @pytest.fixture(scope="module", params=["ads1015", "ads1115"])

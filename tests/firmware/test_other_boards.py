@@ -113,12 +113,24 @@ def compile_for(folder, defines, header, declarations):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("target", "ads"), [(name, ads) for n, name in enumerate(TARGETS) for ads in (0, (1015, 1115)[n % 2])]
+    ("target", "ads"),
+    [
+        (name, ads)
+        for n, name in enumerate(TARGETS)
+        for ads in (0, (1015, 1115)[n % 2])
+        if ads or not name.startswith("esp32")
+    ],
 )
 def test_the_sketch_compiles_for_it(tmp_path, target, ads):
     defines, *rest = TARGETS[target]
     done = compile_for(tmp_path, f"{defines} -DCONESKIN_ADS={ads}", *rest)
     assert done.returncode == 0, done.stderr
+
+
+@needs_compiler
+def test_the_own_converter_of_an_esp32_is_refused_by_the_compiler(tmp_path):
+    defines, *rest = TARGETS["esp32"]
+    assert "dead below 0.14 V" in compile_for(tmp_path, defines, *rest).stderr
 
 
 @needs_compiler

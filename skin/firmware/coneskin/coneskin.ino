@@ -79,9 +79,10 @@ void drive(Electrode electrode, Drive how) {
   if (now[electrode] == how) return;  // switching takes 10 us on a slow board
   now[electrode] = how;
   if (how != RAIL) digitalWrite(BOARD.rail[electrode], LOW);
-  pinMode(BOARD.ground[electrode], how == GROUND ? OUTPUT : INPUT);  // as an output it is low: see setup
+  if (how != GROUND) digitalWrite(BOARD.ground[electrode], LOW);
   if (electrode >= C) pinMode(BOARD.pull_down[electrode - C], how == PULL_DOWN ? OUTPUT : INPUT);
   if (how == RAIL) digitalWrite(BOARD.rail[electrode], HIGH);
+  if (how == GROUND) digitalWrite(BOARD.ground[electrode], HIGH);
 }
 
 void drive_all(Drive a, Drive b, Drive c, Drive d) {
@@ -158,7 +159,7 @@ void self_test() {
   delayMicroseconds(settings[SETTLE_US]);
   const uint16_t tolerance = ((uint16_t(1) << CONVERTER.bits) - 1) / 50;
   const uint16_t expected = half ? converter_read(CONVERTER.supply) : 0;
-  const bool current = half && converter_read(CONVERTER.current) > tolerance;
+  const bool current = half && converter_read(CONVERTER.current) > 2 * tolerance;  // the amplifier's zero is above 0
   const uint8_t turn = frame.sequence / 2 % 4;
   for (uint8_t k = A; k <= D; k++) {
     if (CONVERTER.slow && k != turn) continue;
@@ -270,8 +271,8 @@ void setup() {
   for (uint8_t k = A; k <= D; k++) {
     digitalWrite(BOARD.rail[k], LOW);
     pinMode(BOARD.rail[k], OUTPUT);
-    pinMode(BOARD.ground[k], INPUT);
     digitalWrite(BOARD.ground[k], LOW);
+    pinMode(BOARD.ground[k], OUTPUT);
   }
   for (uint8_t k = 0; k < 2; k++) digitalWrite(BOARD.pull_down[k], LOW);
   Serial.begin(BOARD.baud);

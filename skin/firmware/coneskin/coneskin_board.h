@@ -4,7 +4,7 @@
 // sense:     channels of the converter, one for each electrode A, B, C, D, on wires of their own
 // current:   channel of the amplifier over the shunt;  supply: channel of the rail behind the shunt
 // rail:      gates of the four analog switches from the rail to A, B, C, D; a high gate closes one
-// ground:    pins that are A, B, C, D themselves: low drives the electrode to ground, as an input it is free
+// ground:    gates of those from A, B, C, D to ground, likewise
 // pull_down: pins at the far end of the resistors from C and D: low connects them
 // select:    pins that address an analog multiplexer where the board has too few channels; all six are then channels
 //            of the multiplexer, whose output is at the pin `common`
@@ -27,6 +27,10 @@ struct Board {
   uint8_t rail[4], ground[4], pull_down[2];
   uint8_t select[3], common;
 };
+
+#if defined(ARDUINO_ARCH_ESP32) && !CONESKIN_ADS
+#error "The ESP32's own converter is dead below 0.14 V and bent by per cents: set CONESKIN_ADS to 1115."
+#endif
 
 // clang-format off
 #if defined(ARDUINO_AVR_UNO) || defined(ARDUINO_AVR_NANO)

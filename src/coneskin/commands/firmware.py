@@ -5,8 +5,9 @@ example:
   coneskin firmware out/sensor.toml --board pico --to board
   coneskin firmware out/sensor.toml --converter ads1115 --to board     15 bits, 40 frames a second
 
-The folder then holds the sketch (coneskin/coneskin.ino), wiring.svg, board.md with pins, parts, settings and what the
-scene must say, and frame_vectors.csv: 50 frames with which other firmware is tested.
+The folder then holds the sketch (coneskin/coneskin.ino), wiring.svg, board.md with pins, cable, first steps, settings
+and what the scene must say, parts.csv, board.net for KiCad, and frame_vectors.csv: 50 frames with which other firmware
+is tested.
 Files that are there already and are others, such as a sketch of your own, are not replaced without --force.
 Exit code: 0 written, 1 not written.
 """
@@ -55,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     files = {args.to / path.relative_to(source): path.read_bytes() for path in own if path.is_file()}
     files[args.to / "coneskin" / "coneskin_board.h"] = board_header(args.converter)
     files[args.to / "wiring.svg"] = wiring_diagram(circuit).encode()
+    files[args.to / "parts.csv"] = circuit.part_list().encode()
+    files[args.to / "board.net"] = circuit.kicad_netlist().encode()
     files[args.to / "board.md"] = board_page(circuit).encode()
     there = [str(path) for path, data in files.items() if path.exists() and path.read_bytes() != data]
     if there and not args.force:

@@ -14,12 +14,12 @@ enum { PIN_FREE, PIN_PULLED_UP, PIN_LOW, PIN_HIGH };
 
 typedef struct {
   double supply;                       /* potential of the source before the shunt [V] */
-  double shunt, leads, pin, switches;  /* shunt, lead of an electrode, a pin that drives, an analog switch [ohm] */
+  double shunt, leads, pin, switches;  /* shunt, lead of an electrode, a pin of a pull-down, an analog switch [ohm] */
   double pulldown, input, pullup;      /* resistors of the touch phase, of each input, of a controller's pin [ohm] */
   double logic;                        /* potential of a high pin [V] */
   double cable, layers, rail;          /* capacitance of an electrode's wires, between the layers, of the rail [F] */
   double sheets[4][4];                 /* admittances of the sheets with their contacts [S] */
-  int closed[4], ground[4], down[2];   /* switches to the rail; state of the pins */
+  int closed[4], ground[4], down[2];   /* switches to the rail, and to ground; state of the pull-downs' pins */
   /* the rest is worked out */
   double now, since;                   /* time, and when this state began [s] */
   double settled[NODES], amplitude[NODES], rate[NODES], shape[NODES][NODES];
@@ -99,7 +99,7 @@ static void rewire(Circuit *c) {
   for (int i = 0; i < 4; i++) {
     for (int j = 0; j < 4; j++) g[i][j] = c->sheets[i][j];
     g[i][i] += 1.0 / c->input;
-    pin_load(c, c->ground[i], c->leads, &g[i][i], &s[i]);
+    if (c->ground[i]) g[i][i] += 1.0 / (c->switches + c->leads);
     if (i >= 2) pin_load(c, c->down[i - 2], c->leads + c->pulldown, &g[i][i], &s[i]);
     if (c->closed[i]) {
       const double y = 1.0 / (c->switches + c->leads);

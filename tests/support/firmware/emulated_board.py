@@ -171,6 +171,7 @@ def _words(
         "supply": electronics.supply_volts,
         "shunt": shunt_ohms(electronics),
         "gain": SENSE_GAIN,
+        "bias": electronics.current_zero * SENSE_GAIN * shunt_ohms(electronics),
         "reference": electronics.adc_volts,
         "pulldown": electronics.pulldown_ohms,
         "input": electronics.input_ohms,

@@ -44,7 +44,7 @@ static int powered = 1, linked = 1, port_full, pins[12], sense[4], current_chann
 static Ads chips[2];
 static double ads_kind; /* 1015 or 1115: what stands in for the controller's own converter; 0: nothing */
 static int ads_linked = 1;
-static double reference = 3.3, sense_gain = 50.0, noise = 1.5e-3;
+static double reference = 3.3, sense_gain = 50.0, bias = 0.0, noise = 1.5e-3;
 static uint8_t sent[4096], received[4096];
 static size_t sent_count, received_count, received_at;
 static uint64_t random_state = 1;
@@ -74,7 +74,7 @@ static void follow_pins(void) {
   advance(&circuit, seconds());
   for (int k = 0; k < 4; k++) {
     circuit.closed[k] = pin_state(pins[k]) == PIN_HIGH; /* a resistor holds the gate of a switch low otherwise */
-    circuit.ground[k] = pin_state(pins[4 + k]);
+    circuit.ground[k] = pin_state(pins[4 + k]) == PIN_HIGH;
     if (k < 2) circuit.down[k] = pin_state(pins[8 + k]);
   }
   circuit.changed = 1;
@@ -84,7 +84,7 @@ static double channel_volts(const double *volts, int channel) {
   for (int k = 0; k < 4; k++)
     if (channel == sense[k]) return volts[k];
   if (channel == supply_channel) return volts[RAIL_NODE];
-  if (channel == current_channel) return sense_gain * (circuit.supply - volts[RAIL_NODE]);
+  if (channel == current_channel) return bias + sense_gain * (circuit.supply - volts[RAIL_NODE]);
   return 0.0;
 }
 
@@ -100,7 +100,7 @@ static void convert(struct avr_irq_t *irq, uint32_t value, void *param) {
   const double here = channel_volts(volts, channel);
   if (trace) {
     fprintf(trace, "%.7f %d %.6f %.6f", seconds(), channel, here, channel_volts(circuit.settled, channel));
-    for (int k = 0; k < 4; k++) fprintf(trace, " %d", circuit.closed[k] ? 9 : circuit.ground[k]);
+    for (int k = 0; k < 4; k++) fprintf(trace, " %d", circuit.closed[k] ? 9 : circuit.ground[k] ? PIN_LOW : PIN_FREE);
     fprintf(trace, " %d %d\n", circuit.down[0], circuit.down[1]);
   }
   const double seen = here + noise * gauss();
@@ -241,7 +241,7 @@ static void set(const char *word) {
     {"supply", &circuit.supply}, {"shunt", &circuit.shunt}, {"leads", &circuit.leads}, {"pin", &circuit.pin},
     {"switches", &circuit.switches}, {"pulldown", &circuit.pulldown}, {"input", &circuit.input},
     {"cable", &circuit.cable}, {"layers", &circuit.layers}, {"reference", &reference}, {"gain", &sense_gain},
-    {"noise", &noise}, {"ads", &ads_kind},
+    {"noise", &noise}, {"bias", &bias}, {"ads", &ads_kind},
   };
   for (size_t k = 0; equals && k < sizeof numbers / sizeof *numbers; k++)
     if (strlen(numbers[k].name) == length && !strncmp(word, numbers[k].name, length)) {
