@@ -88,6 +88,16 @@ def until(what, seconds=DEADLINE):
         time.sleep(0.02)  # each look costs the controller something
 
 
+def await_message(session, words, after=0):
+    """Wait for a message with these words; a busy computer has others to tell of. Returns the position after it."""
+    while True:
+        message = session.wait_for(("message",), DEADLINE, after)
+        assert message is not None, f"nothing was said of {words!r}"
+        after = session.events.index(message) + 1
+        if words in message.details["what"]:
+            return after
+
+
 def until_undisturbed(attempt):
     """Make attempts, each in a fresh session, until one gives something that no hold-up of this computer has ended.
 

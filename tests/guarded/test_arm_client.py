@@ -14,7 +14,7 @@ from coneskin.robot.sim.urscript.values import values_of
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 
-from .guarded_session import DEADLINE, is_reset, scene_for, until
+from .guarded_session import DEADLINE, await_message, is_reset, scene_for, until
 
 pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
@@ -181,8 +181,7 @@ def test_a_program_that_falls_silent_does_not_move_its_arm_on(controller, sessio
             time.sleep(0.02)  # each look costs the controller something
         state = controller.wait_for_standstill()
         assert max(map(abs, state["qd"])) == 0.0, name
-        said = session.wait_for(("message",), DEADLINE, began)
-        assert "no new speed or servo command" in said.details["what"], name
+        await_message(session, "no new speed or servo command", began)
         session.arm.move_j(START, 2.0, 8.0)  # no stop of the guard: the program may go on
 
 

@@ -9,7 +9,7 @@ from coneskin.robot.ur.input_writers import heartbeat_lines
 from coneskin.session.session import guard
 from coneskin.testing.scenes import START
 
-from .guarded_session import DEADLINE, FAR, assert_stopped_on_the_way, fast, refusal, scene_for, until
+from .guarded_session import DEADLINE, FAR, assert_stopped_on_the_way, await_message, fast, refusal, scene_for, until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 
@@ -103,5 +103,4 @@ def test_beside_a_program_without_the_lines_the_guard_does_not_become_active(con
 def test_without_the_lines_it_is_said_where_they_are_not_required(controller):
     with guard(scene_for(controller, control="external")) as session:
         send(controller.host, 30002, WITHOUT)
-        said = session.wait_for(("message",), DEADLINE)
-        assert "goes on if the network is cut" in said.details["what"]
+        await_message(session, "goes on if the network is cut")

@@ -14,7 +14,15 @@ from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.testing.scenes import START, commissioned, forearm_scene
 
-from .guarded_session import DEADLINE, PATIENT, assert_stopped_on_the_way, is_reset, run_until_moving, until
+from .guarded_session import (
+    DEADLINE,
+    PATIENT,
+    assert_stopped_on_the_way,
+    await_message,
+    is_reset,
+    run_until_moving,
+    until,
+)
 
 pytestmark = [
     pytest.mark.long,
@@ -32,16 +40,6 @@ def plugged(port, sensor):
         port.symlink_to(terminal.path)
         yield
         port.unlink()
-
-
-def open_again(session, after):
-    """Wait until the port is open again; the position after that event."""
-    while True:
-        event = session.wait_for(("message",), DEADLINE, after)
-        assert event is not None, "the port was not opened again"
-        after = session.events.index(event) + 1
-        if "open again" in event.details["what"]:
-            return after
 
 
 def another_device(session):
@@ -69,11 +67,11 @@ def test_the_arm_stops_and_goes_on_only_with_the_same_device_and_a_reset(tmp_pat
             with pytest.raises(RobotRefused, match="is gone"):
                 session.reset()
             with plugged(port, replace(sensor, device_id=5)):
-                seen = open_again(session, 0)
+                seen = await_message(session, "open again")
                 until(lambda: another_device(session))
             assert session.wait_for(("fault",), DEADLINE, seen) is not None
             with plugged(port, sensor):
-                open_again(session, seen)
+                await_message(session, "open again", seen)
                 stop = controller.state()["q"]
                 until(lambda: is_reset(session))
                 session.arm.move_j([stop[0] - 0.1, *stop[1:]], speed=0.5, acceleration=2.0)
