@@ -32,6 +32,7 @@ from .signals.journal import BlockKind, EventFolding, EventName, Outputs, decode
 
 if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
+    from .controller_heartbeat import ControllerHeartbeat
 
 _MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
 
@@ -115,8 +116,11 @@ class GuardCore:
         }
         if arm is not None:
             self._feeders[BlockKind.ARM] = partial(self._feed_arm, arm)
-            self._feeders[BlockKind.SLIDER] = partial(self._feed_slider, arm)
-            self._feeders[BlockKind.ECHO] = partial(self._feed_echo, arm)
+            if isinstance(arm.driver, SliderDriver):  # asked once: a protocol's isinstance takes its time
+                self._feeders[BlockKind.SLIDER] = partial(self._feed_slider, arm, arm.driver.decode_speed_fraction)
+            if arm.heartbeat is not None:
+                decode = require(arm.driver, HeartbeatDriver).decode_heartbeat
+                self._feeders[BlockKind.ECHO] = partial(self._feed_echo, arm.heartbeat, decode)
 
     @property
     def phase(self) -> Phase:
@@ -274,20 +278,18 @@ class GuardCore:
         else:
             emit(out, EventName.MESSAGE, now, what=trouble)
 
-    def _feed_slider(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
-        decode = require(arm.driver, SliderDriver).decode_speed_fraction
+    def _feed_slider(self, arm: ArmSupervisor, decode: Callable[[bytes], float], block: Block, out: Outputs) -> None:
         fraction = self._decode(block, "the speed slider cannot be read", decode, out)
         if fraction is not None:
             arm.speed_reduction.feed(block.time, fraction)
 
-    def _feed_echo(self, arm: ArmSupervisor, block: Block, out: Outputs) -> None:
+    def _feed_echo(
+        self, heartbeat: ControllerHeartbeat, decode: Callable[[bytes], int], block: Block, out: Outputs
+    ) -> None:
         """Take the program's answer to the heartbeat."""
-        if arm.heartbeat is None:
-            return
-        what = "the program's answer to the heartbeat cannot be read"
-        count = self._decode(block, what, require(arm.driver, HeartbeatDriver).decode_heartbeat, out)
+        count = self._decode(block, "the program's answer to the heartbeat cannot be read", decode, out)
         if count is not None:
-            arm.heartbeat.feed(count)
+            heartbeat.feed(count)
 
     def _decode(self, block: Block, what: str, decode: Callable[[bytes], _Decoded], out: Outputs) -> _Decoded | None:
         """Return what the controller has sent. None, after a fault that says ``what``, where it is unreadable."""
