@@ -1,8 +1,8 @@
 """Explorer of a world: breadth first over abstract states, until there is no new one. It knows no guard.
 
-A world can be copied, has an abstract state (``key``), and takes actions by their names. After each action it says
-which written invariants it has broken. What holds in the long run is read off the graph at the end: from every state a
-helpful way leads to a state that is wanted.
+A world can go back to where it was, has an abstract state (``key``), and takes actions by their names. After each
+action it says which written invariants it has broken. What holds in the long run is read off the graph at the end: from
+every state a helpful way leads to a state that is wanted.
 """
 
 from __future__ import annotations
@@ -11,14 +11,17 @@ import time
 from collections import Counter, deque
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Any, Protocol
 
 
 class World(Protocol):
     """What an explorer needs of a world."""
 
-    def copy(self) -> Self:
-        """Return a world that goes on alone from here."""
+    def save(self) -> Any:
+        """Return what ``restore`` needs to go on from here."""
+
+    def restore(self, saved: Any) -> None:
+        """Go back to where it was."""
 
     def key(self) -> Hashable:
         """Return the abstract state."""
@@ -60,45 +63,47 @@ class Exploration:
     by_action: dict[str, int] = field(default_factory=dict)
 
 
-def explore(start: World, progress: str = "", most_states: int = 1_000_000, stop_at_first: bool = False) -> Exploration:
+def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop_at_first: bool = False) -> Exploration:
     """Explore a world to the end.
 
     Args:
-        start: its first state.
+        world: in its first state; afterwards it is anywhere.
         progress: name of the invariant that a helpful way leads from every state to a wanted one. Empty for none.
         most_states: after which to give up.
         stop_at_first: end with the first broken invariant.
     """
     began = time.process_time()
-    first = start.key()
+    first = world.key()
     ways: dict[Hashable, tuple[Hashable | None, str, int]] = {first: (None, "", 0)}
     back: dict[Hashable, list[Hashable]] = {first: []}
-    wanted = {first} if start.wanted else set()
+    wanted = {first} if world.wanted else set()
     broken: dict[str, tuple[tuple[str, ...], str]] = {}
     unsound: set[Hashable] = set()  # reached by a broken invariant: nothing after it counts
-    queue: deque[tuple[Hashable, World]] = deque([(first, start)])
+    queue: deque[tuple[Hashable, Any]] = deque([(first, world.save())])
     fresh: Counter[str] = Counter()
     steps = depth = 0
     while queue and len(ways) < most_states and not (stop_at_first and broken):
-        here, world = queue.popleft()
+        here, saved = queue.popleft()
+        world.restore(saved)
         for action in world.actions():
             steps += 1
-            then = world.copy()
-            wrong = then.act(action)
+            world.restore(saved)
+            helps = world.helps(action)
+            wrong = world.act(action)
             for line in wrong:
                 broken.setdefault(line.partition(":")[0], ((*_way(ways, here), action), line))
             if wrong:
                 continue
-            key = then.key()
+            key = world.key()
             if key not in ways:
                 ways[key] = here, action, ways[here][2] + 1
                 depth = max(depth, ways[key][2])
                 back[key] = []
                 fresh[action] += 1
-                queue.append((key, then))
-                if then.wanted:
+                queue.append((key, world.save()))
+                if world.wanted:
                     wanted.add(key)
-            if world.helps(action):
+            if helps:
                 back[key].append(here)
     closed = not queue
     if progress and closed:

@@ -39,7 +39,7 @@ from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, encode
 
-from .snapshot import clone
+from .snapshot import Snapshot, restore, save
 
 REACTIONS = {
     "stop": 'kind = "stop"',
@@ -261,9 +261,11 @@ class GuardWorld:
 
     # ---- what an explorer needs
 
-    def copy(self) -> GuardWorld:
-        made: GuardWorld = clone(self, {}, _SHARED)
-        return made
+    def save(self) -> Snapshot:
+        return save(self, _SHARED)
+
+    def restore(self, saved: Snapshot) -> None:
+        restore(saved)
 
     def key(self) -> Hashable:
         core, judge = self.core, self._judge

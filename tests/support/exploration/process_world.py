@@ -116,8 +116,11 @@ class ProcessWorld:
         self.control, self.parts, self.state = control, parts, state
         self.most_wrong, self.without = most_wrong, without
 
-    def copy(self) -> ProcessWorld:
-        return ProcessWorld(self.control, self.parts, self.most_wrong, self.without, self.state)
+    def save(self) -> _State:
+        return self.state
+
+    def restore(self, saved: _State) -> None:
+        self.state = saved
 
     def key(self) -> Hashable:
         return self.state

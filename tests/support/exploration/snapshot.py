@@ -1,4 +1,4 @@
-"""Snapshots of machines of plain objects: copies that go on alone, of pure and of compiled code alike."""
+"""Snapshots of machines of plain objects, to go back to, of pure and of compiled code alike."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import Any
 _SHARED: dict[type, bool] = {}
 _ATTRIBUTES: dict[type, tuple[str, ...] | None] = {}
 _PLAIN = (int, float, complex, bool, str, bytes, type(None), type, range, re.Pattern, frozenset)
-_FUNCTIONS = (types.FunctionType, types.BuiltinFunctionType, types.ModuleType, enum.Enum)
+_NOTHING = object()
+Snapshot = list[tuple[Any, Any]]  #: of each object what it holds
 
 
 def _is_shared(kind: type) -> bool:
@@ -34,58 +35,69 @@ def _attributes(kind: type) -> tuple[str, ...] | None:
     return _ATTRIBUTES[kind]
 
 
-def clone(value: Any, memo: dict[int, Any], shared: frozenset[str] = frozenset()) -> Any:
-    """Return a copy that shares only what never changes.
+def save(root: Any, shared: frozenset[str] = frozenset()) -> Snapshot:
+    """Return what all objects hold that a machine leads to; ``restore`` puts it back into the same objects.
+
+    No object is made anew: a compiled class makes none without its arguments.
 
     Args:
-        value: to copy.
-        memo: by identity, what was copied already; empty at first.
+        root: the machine.
         shared: names of classes that never change although they could.
     """
-    kind = type(value)
-    known = _SHARED.get(kind)
-    if known is None:
-        known = _SHARED[kind] = _is_shared(kind) or kind.__name__ in shared
-    if known:
-        return value
-    if kind is tuple or issubclass(kind, tuple):
-        items = [clone(item, memo, shared) for item in value]
-        if all(a is b for a, b in zip(items, value, strict=True)):
-            return value
-        return kind(items) if kind is tuple else kind(*items)
-    made = memo.get(id(value))
-    if made is not None:
-        return made
-    if kind is list:
-        made = memo[id(value)] = []
-        made.extend(clone(item, memo, shared) for item in value)
-    elif kind is dict:
-        made = memo[id(value)] = {}
-        for name, item in value.items():
-            made[name] = clone(item, memo, shared)
-    elif kind is set:
-        made = memo[id(value)] = set(value)
-    elif kind is deque:
-        made = memo[id(value)] = deque((clone(item, memo, shared) for item in value), value.maxlen)
-    elif kind is bytearray:
-        made = memo[id(value)] = bytearray(value)
-    elif kind is partial:
-        made = partial(clone(value.func, memo, shared), *(clone(item, memo, shared) for item in value.args))
-    elif kind is types.MethodType:
-        made = types.MethodType(value.__func__, clone(value.__self__, memo, shared))
-    elif (owner := getattr(value, "__self__", None)) is not None and hasattr(value, "__name__"):
-        return (
-            value
-            if isinstance(owner, (types.ModuleType, type))
-            else getattr(clone(owner, memo, shared), value.__name__)
-        )
-    else:
-        made = memo[id(value)] = kind.__new__(kind)
-        names = _attributes(kind)
-        for name in value.__dict__ if names is None else names:
-            try:
-                item = getattr(value, name)
-            except AttributeError:
-                continue
-            setattr(made, name, clone(item, memo, shared))
-    return made
+    found: dict[int, tuple[Any, Any]] = {}
+    todo = [root]
+    while todo:
+        value = todo.pop()
+        kind = type(value)
+        known = _SHARED.get(kind)
+        if known is None:
+            known = _SHARED[kind] = _is_shared(kind) or kind.__name__ in shared
+        if known or id(value) in found:
+            continue
+        held: Any
+        if issubclass(kind, tuple):
+            todo.extend(value)
+            continue
+        if kind is partial:
+            todo += [value.func, *value.args]
+            continue
+        if kind is dict:
+            held = dict(value)
+            todo.extend(held.values())
+        elif kind is bytearray:
+            held = bytes(value)
+        elif kind in (list, set, deque):
+            held = tuple(value)
+            todo.extend(held)
+        elif hasattr(value, "__self__"):  # a method
+            todo.append(value.__self__)
+            continue
+        elif (names := _attributes(kind)) is None:
+            held = dict(value.__dict__)
+            todo.extend(held.values())
+        else:
+            held = {name: getattr(value, name) for name in names if hasattr(value, name)}
+            todo.extend(held.values())
+        found[id(value)] = value, held
+    return list(found.values())
+
+
+def restore(saved: Snapshot) -> None:
+    """Let all objects hold again what they held."""
+    for value, held in saved:
+        kind = type(value)
+        if kind in (list, bytearray):
+            value[:] = held
+        elif kind in (dict, set):
+            value.clear()
+            value.update(held)
+        elif kind is deque:
+            value.clear()
+            value.extend(held)
+        elif _attributes(kind) is None:
+            value.__dict__.clear()
+            value.__dict__.update(held)
+        else:
+            for name, item in held.items():
+                if getattr(value, name, _NOTHING) is not item:
+                    setattr(value, name, item)
