@@ -86,7 +86,7 @@ def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
     expected = {
         f"{name}/{path.relative_to(folder).as_posix()}"
         for name, folder in folders.items()
-        for pattern in ("*.py", "*.pyi", "py.typed", "*.json", "*.csv", "*.ino", "*.h", "*.c")
+        for pattern in ("*.py", "*.pyi", "py.typed", "*.json", "*.csv", "*.ino", "*.h", "*.c", "gallery/*.rec")
         for path in folder.rglob(pattern)
     }
     found = {name for name in contents(wheel) if ".dist-info/" not in name}

@@ -5,6 +5,7 @@ examples:
   coneskin replay runs/2026-01-31T12-00-00 --events --picture run.png
   coneskin replay runs/                               which runs are there
   coneskin replay runs/*                              all of them, side by side
+  coneskin replay gallery:palm --events               a run that the package contains: hand, palm, grip, slide, wire
 
 what if:
   coneskin replay runs/a --set reaction.kind=stop --set detection.touch_level=0.08

@@ -172,10 +172,11 @@ def _read(path: Path) -> Run:
 
 
 def _info(args: argparse.Namespace) -> int:
+    from coneskin.runs.replay.run import run_path
     from coneskin.runs.run_files import summarise_run
 
     recorded = _read(args.run)
-    facts = summarise_run(args.run, recorded, ProgressBar(f"{args.run}"))
+    facts = summarise_run(run_path(args.run), recorded, ProgressBar(f"{args.run}"))
     if args.json:
         print(json.dumps(facts))
         return 0

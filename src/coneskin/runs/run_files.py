@@ -14,6 +14,8 @@ from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import BlockKind, EventName
 
+from .replay.run import run_path
+
 if TYPE_CHECKING:
     from .replay.run import Run
 
@@ -24,6 +26,7 @@ _PART_PATTERN = re.compile(r"(.+)\.\d{4}\.rec")
 
 def is_run(path: Path) -> bool:
     """Tell whether a path is one run: a file, or a folder with a recording of that name in it."""
+    path = run_path(path)
     return path.is_file() or (path / _IN_FOLDER).is_file()
 
 
@@ -43,7 +46,7 @@ def find_recordings(paths: Iterable[Path], beside: bool = False) -> list[Path]:
         RecordingError: a path does not exist, or there is no recording below it.
     """
     found: dict[Path, None] = {}
-    for path in paths:
+    for path in map(run_path, paths):
         if not path.exists():
             raise RecordingError(f"there is no run {path}: name a recording, or a folder with recordings in it")
         if not (below := dict.fromkeys(_recordings(path, beside))):

@@ -414,16 +414,31 @@ def read_header(block: Block | None, path: Path) -> dict[str, Any]:
     return header
 
 
+def run_path(path: Path | str) -> Path:
+    """Return the path of a run; ``gallery:palm`` is a recording that the package contains.
+
+    Raises:
+        RecordingError: the gallery has no such run.
+    """
+    word, _, name = str(path).partition(":")
+    if word != "gallery":
+        return Path(path)
+    known = {each.stem: each for each in sorted((Path(__file__).parents[1] / "gallery").glob("*.rec"))}
+    if name not in known:
+        raise RecordingError(f"there is no run {path}: name one of {', '.join(f'gallery:{each}' for each in known)}")
+    return known[name]
+
+
 def read_run(path: Path | str, progress: Progress = silent) -> Run:
     """Read a recorded run.
 
     Args:
-        path: the recording, or the folder of a run with one in it.
+        path: the recording, the folder of a run with one in it, or one of the gallery, such as ``gallery:palm``.
 
     Raises:
         RecordingError: there is none, or it has no header.
     """
-    path = Path(path)
+    path = run_path(path)
     if path.is_dir():
         if not (path / "run.rec").exists() and (runs := sorted(path.glob("*/run.rec"))):
             raise RecordingError(f"{path} is a folder of {len(runs)} runs: name one of them, such as {runs[-1].parent}")
