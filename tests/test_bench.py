@@ -29,6 +29,7 @@ def list_of_benches() -> dict[str, str]:
     return dict(line.split(maxsplit=1) for line in done.stdout.split("\n\n")[-1].splitlines())
 
 
+@pytest.mark.long
 def test_the_runner_lists_each_bench_with_a_line() -> None:
     benches = list_of_benches()
     assert len(benches) > 30

@@ -101,6 +101,7 @@ def test_the_help_of_the_program_names_all_commands(capsys: Output) -> None:
     assert capsys.readouterr().out == f"coneskin {__version__} ({code_build()})\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", COMMANDS)
 def test_only_the_module_of_the_chosen_command_is_imported(command: str) -> None:
     code = (

@@ -260,6 +260,7 @@ def test_a_block_that_fails_is_seen(page_run: PageRun) -> None:
     ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES)
 def test_the_files_that_a_page_names_exist(page: str) -> None:
     """Names of modules in code font, and paths that begin with a folder of the repository."""
@@ -280,6 +281,7 @@ def test_the_links_of_a_page_at_the_root_lead_somewhere(page: str) -> None:
     assert sorted(name for name in targets if "://" not in name and not (ROOT / name).exists()) == []
 
 
+@pytest.mark.long
 def test_the_tables_to_look_up_are_what_the_script_makes() -> None:
     done = subprocess.run(
         [sys.executable, "scripts/reference.py", "--check"], cwd=ROOT, capture_output=True, text=True, timeout=120
@@ -287,6 +289,7 @@ def test_the_tables_to_look_up_are_what_the_script_makes() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_every_promise_has_a_test_and_every_id_is_a_promise() -> None:
     promises, proofs = reference.promises(), reference.proofs()
     print(f"{len(promises)} promises, {sum(map(len, proofs.values()))} proofs")

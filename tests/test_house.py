@@ -16,6 +16,8 @@ import pytest
 import coneskin
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.long
+
 FOLDERS = ("geometry", "skin", "robot")
 #: floors of the house, from the ground up: a folder imports only from the floors below its own
 FLOORS = (

@@ -9,6 +9,8 @@ import pytest
 
 from .scene.scenes import DOUBLE_CONE, SERIAL_RETREAT, SKIN_ONLY, record
 
+pytestmark = pytest.mark.long
+
 NUMERIC = {"numpy", "scipy"}
 DEVICES = {"serial", "rtde_control", "rtde_receive", "rtde_io", "dashboard_client"}
 DRAWING = {"trimesh", "matplotlib", "ezdxf", "collada", "embreex", "tomli_w"}

@@ -26,6 +26,7 @@ _NAMES = {"src/coneskin/session/guard_run.py": {"bind", "listen"}}
 _PAGES = {"src/coneskin/view/page_server.py": {"bind"}}  # viser listens: of a page to look at, or of the designer's
 
 
+@pytest.mark.long
 @pytest.mark.promise("P65")
 def test_only_the_simulated_controller_and_the_pages_open_ports() -> None:
     found = {str(path.relative_to(ROOT)): opened for path in sources() if (opened := _calls(path))}

@@ -23,6 +23,12 @@ Output = pytest.CaptureFixture[str]
 MESH = Path(os.environ.get("CONESKIN_DATA", SHARED_DATA)) / "ur/ur5e/visual"
 
 
+@pytest.fixture(autouse=True)
+def _short_hold_up_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure the hold-ups of this computer for a moment; a user waits ten seconds."""
+    monkeypatch.setattr("coneskin.commands.doctor._HOLD_UP_TIME", 0.1)
+
+
 @pytest.mark.long
 @pytest.mark.processes
 @pytest.mark.skipif(not MESH.is_dir(), reason=f"there are no meshes in {MESH}")

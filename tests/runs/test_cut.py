@@ -49,6 +49,7 @@ def test_a_cut_that_shows_another_reaction_says_so(collision: Run, tmp_path: Pat
     assert cut.other_reaction.endswith("; in the whole run nothing")
 
 
+@pytest.mark.long
 def test_a_cut_without_a_duration_begins_as_early_as_the_same_contacts_need(
     collision: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,6 +28,7 @@ WORK: dict[str, Callable[[Run, Path, Progress], object]] = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("work", WORK)
 def test_progress_is_told_from_the_first_seconds_of_a_run_to_its_end(work: str, collision: Run, tmp_path: Path) -> None:
     told: list[float] = []

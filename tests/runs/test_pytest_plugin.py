@@ -68,6 +68,7 @@ def test_a_tolerance_that_does_not_exist_is_refused_whatever_is_collected(projec
     assert "--coneskin-tolerance: there is no tolerance plaec_mm; there are place_mm" in out
 
 
+@pytest.mark.long
 def test_every_recording_is_a_test_and_an_incomplete_one_fails(project: Project) -> None:
     whole = COLLISION.read_bytes()
     (project.runs / "collision.rec").write_bytes(whole)

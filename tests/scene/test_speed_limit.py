@@ -222,6 +222,7 @@ def along(way: tuple[float, ...], normal: tuple[float, ...]) -> float:
 BOX = "bend_wrap_deg = [80, 10, 80, 10, 80, 10, 80, 10]\nbend_turn_deg = [0, 90, 0, 90, 0, 90, 0, 90]\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bends", ["", BOX], ids=["cylinder", "box"])
 def test_no_place_is_faster_than_its_patches_are_held_to_be(bends: str) -> None:
     """Of a moving cylinder, and of a moving box, whose normal turns by a right angle between two patches."""

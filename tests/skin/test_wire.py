@@ -122,6 +122,7 @@ pieces = st.lists(
 )
 
 
+@pytest.mark.long
 @given(pieces, st.data())
 def test_the_frames_do_not_depend_on_how_the_stream_is_cut(parts, data):
     stream = b"".join(parts)

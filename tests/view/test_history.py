@@ -109,6 +109,7 @@ def test_a_latched_arm_that_is_measured_standing_again_stays_latched() -> None:
     assert _phase_after(latched, EventName.ACTIVATED).text == "active"
 
 
+@pytest.mark.long
 def test_a_page_that_follows_does_not_grow(course: RunCourse) -> None:
     run = read_run(RUN)
     blocks = list(run.select(kinds=frozenset({BlockKind.SKIN, BlockKind.ARM})))

@@ -49,6 +49,7 @@ def test_a_viewer_cannot_move_what_another_looks_at() -> None:
             assert clock_of(victim.hear_until(clock_of)).startswith("2.125")
 
 
+@pytest.mark.long
 def test_nonsense_in_a_control_leaves_the_next_viewer_a_page() -> None:
     with PageServer("runs", port=18180) as server:
         show_runs(server, read_courses([RUN]))

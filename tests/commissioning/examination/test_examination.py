@@ -98,6 +98,7 @@ def test_wires_that_must_be_moved_are_named(wires: str) -> None:
     assert doctor.patches == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("wires", "firmware", "keys"), MENDED)
 def test_what_the_scene_can_mend_is_patched_and_then_read_where_it_is_touched(
     wires: str, firmware: str, keys: dict[str, str]

@@ -104,6 +104,7 @@ def test_a_rugby_ball_is_two_cones_that_share_the_belt(spoil, tilt: float, shift
     assert fit.reason == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("degrees", sweep([-45.0, 0.0, 3.0, -60.0, -10.0, -0.65, 0.05, 20.0, 60.0], short=3))
 def test_one_cone_of_any_half_angle(degrees: float) -> None:
     height = 0.06 if abs(degrees) > 30.0 else 0.2

@@ -37,6 +37,7 @@ def collide(bodies: Sequence[BodyScene], period: int = 5, **padding: float) -> S
     return plant
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("body", "padding"),
     [

@@ -28,6 +28,7 @@ def stopping_time(rig, since):
 # ---- silence
 
 
+@pytest.mark.long
 @pytest.mark.promise("P50")
 @BOTH
 def test_a_program_that_is_suspended_stops_its_arm_within_200_ms(external):
@@ -323,6 +324,7 @@ def test_the_driver_s_program_may_end_where_that_was_announced_and_for_no_longer
     assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
 
 
+@pytest.mark.long
 def test_a_restart_that_is_announced_again_and_again_has_no_more_than_5_s():
     rig = GuardRig(speed=0.0).run(0.5)
     rig.arm.runtime_state = 1

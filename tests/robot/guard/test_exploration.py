@@ -11,6 +11,8 @@ from tests.support.exploration.explorer import explore, follow
 from tests.support.exploration.guard_world import INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
 from tests.support.exploration.process_world import HEEDLESS_PROGRAM, PATIENT_CONTROLLER, Parts, ProcessWorld
 
+pytestmark = pytest.mark.long
+
 #: CI's share; `python -m bench exploration` explores every reaction with each control
 _EXPLORED = [("stop", "internal")]
 

@@ -94,6 +94,7 @@ def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kin
     assert excess(rig, *bodies) < 0.005
 
 
+@pytest.mark.long
 @pytest.mark.promise("P31")
 @pytest.mark.parametrize("force", [5.0, 20.0, 100.0])
 def test_a_press_that_grows_ends_the_retreat(force):

@@ -130,6 +130,7 @@ def test_a_motion_away_ends_where_states_become_late():
     assert retreated.time - rig.event("retreating").time < 0.05 / 0.3 + 0.02 + 0.08
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", [0.04, 0.2])
 def test_a_host_that_was_held_up_reads_late_states_at_once_and_moves_on(seconds):
     rig = QueuedRig(touch(0.5, 0.8), reaction=RETREAT, speed=0.3, limits=PATIENT).run(0.5)

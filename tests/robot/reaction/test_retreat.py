@@ -199,6 +199,7 @@ def test_with_the_joint_that_it_needs_at_its_limit_it_stands() -> None:
     assert "at its limit" in plan.reason
 
 
+@pytest.mark.long
 @pytest.mark.promise("P33")
 def test_a_retreat_into_a_joint_limit_stays_within_it() -> None:
     """Runs that begin close before a limit, in whichever direction they go."""

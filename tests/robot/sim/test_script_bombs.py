@@ -147,6 +147,7 @@ class Watched:
         return ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["def", "sec"])
 @pytest.mark.parametrize("name", BOMBS)
 def test_a_bomb_ends_itself_and_the_next_program_runs(name: str, kind: str) -> None:

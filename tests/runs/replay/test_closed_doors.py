@@ -56,6 +56,7 @@ def test_no_mutated_recording_gives_a_traceback(bases: list[list[Block]], tmp_pa
     _replay_mutated(bases, tmp_path_factory.getbasetemp() / "mutated.rec", seed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [*range(6), 1_653_136_768])  # the last: a picture that overflows
 def test_a_few_mutated_recordings_give_no_traceback(bases: list[list[Block]], tmp_path: Path, seed: int) -> None:
     """The short run's share of the test above."""

@@ -46,6 +46,7 @@ def test_the_table_itself_would_be_found() -> None:
     assert named_keys(TABLE) == NAMES
 
 
+@pytest.mark.long
 def test_no_other_module_spells_out_a_key() -> None:
     assert {path: named for path in MODULES if (named := named_keys(path))} == {}
 

@@ -30,6 +30,7 @@ def follow(drift, limits, seed, seconds=SECONDS):
     return errors, faults
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("drifts", "limit"), [((9e-5, -9e-5), 1e-4), ((4e-3, -4e-3), 5e-3)])
 def test_frames_of_two_clocks_that_part_are_put_on_one_time(drifts, limit):
     limits = TimingLimits(clock_drift=limit)

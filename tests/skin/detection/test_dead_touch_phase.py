@@ -69,6 +69,7 @@ def missed(sensor: Sensor, stuck: float, places: int, rng: random.Random) -> lis
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stuck", [0.0, 30.0], ids=["zero", "stuck low"])
 @pytest.mark.parametrize("name", SENSORS)
 def test_a_dead_touch_phase_hides_no_touch(name, stuck):

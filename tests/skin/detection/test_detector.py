@@ -212,6 +212,7 @@ def test_a_lasting_contact_is_never_zeroed_away():
     assert lasting.time == pytest.approx(30.2, abs=0.2)
 
 
+@pytest.mark.long
 def test_slow_drift_is_followed_while_untouched_and_frozen_while_touched():
     damp = Imperfections(leak_drift=2.5e-8)  # level 0.025 after 100 s, 1/8 of the fastest drift that is followed
     skin = VirtualSkin(SENSOR, [ScriptedTouch(60, 70, 0.2, 1.0)], rate_hz=50, duration=100.0, imperfections=damp)
@@ -265,6 +266,7 @@ def test_a_detector_that_cannot_be_is_refused(changes, words):
         Detector(SENSOR, DetectorSettings(**changes))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(40))
 def test_a_touch_that_begins_or_ends_between_two_phases_is_a_touch(seed):
     """The phases of one frame then contradict each other, for up to three frames while the layers close."""

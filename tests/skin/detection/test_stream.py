@@ -138,6 +138,7 @@ def test_a_banner_while_the_sensors_are_ready_is_a_fault_of_the_stream():
     assert (event.sensor, event.fault) == ("", Fault.CORRUPT)
 
 
+@pytest.mark.long
 def test_one_damaged_frame_in_a_hundred_is_lived_with():
     stream = TouchStream([LOWER])
     events = play(stream, VirtualSkin(LOWER, duration=5.0, faults=FaultInjection(corrupt_every=100), seed=4))
@@ -145,6 +146,7 @@ def test_one_damaged_frame_in_a_hundred_is_lived_with():
     assert stream.decoder.crc_errors + stream.detectors[0].timing.missing >= 50
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("touches", [[], [ScriptedTouch(0.5, 100.0, 0.05, 2.0)]], ids=["untouched", "touched"])
 def test_no_allocation_outlives_a_frame(touches):
     packets = [data for _, data in VirtualSkin(LOWER, touches, duration=6.0).packets()]

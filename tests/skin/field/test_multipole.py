@@ -19,6 +19,8 @@ from tests.support.sweep import sweep
 
 from ..field_cases import PAPER, SHEETS, finite_differences, guide_volts
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.parametrize(("name", "lower"), [("paper", 1.0), ("narrowing", 4.0), ("cylinder", 4.0)])
 def test_finite_differences_agree(name: str, lower: float) -> None:

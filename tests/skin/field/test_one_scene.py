@@ -54,6 +54,7 @@ def test_a_scene_is_that_of_the_sampled_series(
     assert error_of(model, found, exact) < 1e-12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
 def test_the_error_that_is_told_holds_against_finite_elements(tolerance: float) -> None:
     """170 sensors of NGSolve; what is asked is kept, and what is told is neither less than the error nor idle."""

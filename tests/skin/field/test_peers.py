@@ -141,6 +141,7 @@ class TestCommittedReference:
                 # An algebraic factor rides on the geometric one, and 1e-12 is as far as the reference can emit.
                 assert after < max(1.3 * rate * before, 1e-12), name
 
+    @pytest.mark.long
     def test_the_general_method_approaches_it_on_every_shape(self, references: list[Reference]) -> None:
         shapes = [r for r in references if r.problem.patches or r.problem.name.startswith("clipped")]
         assert len(shapes) >= 12

@@ -9,6 +9,8 @@ import pytest
 from tests.support.field.extremes import extreme_cases, measure, scale_errors
 from tests.support.sweep import sweep
 
+pytestmark = pytest.mark.long
+
 CASES = {case.name: case for case in extreme_cases()}
 
 #: Where doubles no longer hold the input: the gap to an edge, and 1 + curvature * width next to an apex.

@@ -91,6 +91,7 @@ def test_a_specimen_is_drawn_by_its_seed() -> None:
     assert all(ohms > 1.0 for ohms in built.electronics.lead_ohms)
 
 
+@pytest.mark.long
 def test_the_command_sends_a_specimen(tmp_path) -> None:
     def run(*options: str) -> bytes:
         out = tmp_path / "out.bin"

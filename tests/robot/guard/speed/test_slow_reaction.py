@@ -19,6 +19,8 @@ from tests.support.sweep import sweep
 
 from ..reactions import SLOW
 
+pytestmark = pytest.mark.long
+
 
 @pytest.mark.promise("P01")
 def test_slow_while_it_is_touched_then_as_before():

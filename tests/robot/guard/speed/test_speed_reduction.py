@@ -10,6 +10,8 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 from tests.support.guard_rig import GuardRig, touch
 
+pytestmark = pytest.mark.long
+
 SLOW = 0.05  # m/s
 
 

@@ -107,6 +107,7 @@ def pair(kind: str, rng: random.Random, cone: Frustum) -> list[LayerContact]:
     return [pressed(u, phi, one), pressed(v, other, two)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shape", SHAPES)
 def test_one_contact_is_soon_certain(shape):
     sensor, rng = Sensor(SHAPES[shape]), random.Random(1)

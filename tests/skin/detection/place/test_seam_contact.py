@@ -120,6 +120,7 @@ def test_the_line_across_the_seam_has_its_direction():
         assert half * math.cos(direction) == pytest.approx(0.01, rel=0.25)
 
 
+@pytest.mark.long
 @pytest.mark.promise("P02")
 @pytest.mark.parametrize("shape", CLOSED)
 def test_no_third_contact_hides_beside_a_press_over_the_seam(shape):
