@@ -59,7 +59,7 @@ $(VENV)/bin/python:
 
 $(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	@echo "installing, about a minute"
-	$(BIN)/python -m pip install -q --no-compile -e '.[pictures,design]' pytest
+	$(BIN)/python -m pip install -q --no-compile -e '.[pictures]'
 	touch $@
 
 $(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml setup.py
