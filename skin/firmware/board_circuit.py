@@ -24,7 +24,8 @@ _WIRE_OHMS = 1.0  # of the wire of an electrode, with bead, plug and foil
 _QUIET_BITS = 12  # with fewer, a converter without noise of its own reads the same count for ever
 _EXTRA_BITS = 1  # that the sketch's usual setting adds to the converter's: two conversions for a reading
 _BIAS_SHARE = 127.0 / 10127.0  # of 3.3 V, at the amplifier's reference pin
-_INPUT_OHMS = 470e3  # 10 nA of a warm clamp lift a guide that floats by 5 mV; over 10 Mohm it would be 100 mV
+_INPUT_OHMS = 470e3  # 25 nA of warm clamps and switches lift a guide that floats by 12 mV; over 10 Mohm by 250 mV
+PIN_OHMS = 30.0  #: of a controller's pin that holds a pull-down at ground, 25 to 40
 _FIXED_VOLTS = 2.5  # of the cheap regulator
 _LEAST_CHIP_SHUNT = 10.0  # ohm; below, a shunt is a part of its own
 WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
@@ -50,6 +51,7 @@ class BoardCircuit(NamedTuple):
     facts: BoardFacts
     sensor: Sensor  #: with the electronics as the board has them
     shunt_ohms: float
+    pulldown_ohms: float  #: of the resistor itself
     converter: Converter | None  #: in place of the board's own
 
     @property
@@ -66,7 +68,7 @@ class BoardCircuit(NamedTuple):
             "adc_bits": parts.adc_bits,
             "lead_ohm": [float(f"{ohms:g}") for ohms in parts.lead_ohms],
             "supply_v": parts.supply_volts,
-            "pulldown_ohm": parts.pulldown_ohms,
+            "pulldown_ohm": round(parts.pulldown_ohms, 1),
             "input_ohm": parts.input_ohms,
             "current_full_scale_ma": round(1e3 * parts.current_full_scale, 4),
             "current_zero_ma": round(1e3 * parts.current_zero, 6),
@@ -211,14 +213,20 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
         board = board._replace(sense=tuple(electrodes), current=current, supply=rail, select=(), common="")
         bits, volts = other.bits + other.extra_bits, other.volts
     ampere = 1.0 / (SENSE_GAIN * shunt)  # A for a volt
+    lead, resistor = _WIRE_OHMS + limits["on_ohm"][0], sensor.electronics.pulldown_ohms
+    inputs = max(_INPUT_OHMS, 10.0 * resistor)
+    # what a guide of the touch phase sees: the way to the pin, and the input beside it. It is read at the foil, before
+    # the lead that the model of the circuit puts there; a lead more makes up for that to 1e-4 of the scale
+    pulldown = 1.0 / (1.0 / (resistor + PIN_OHMS + _WIRE_OHMS) + 1.0 / inputs) + lead
     electronics = replace(
         sensor.electronics,
         adc_bits=bits,
         adc_volts=volts,
         current_full_scale=volts * ampere,
         current_zero=3.3 * _BIAS_SHARE * ampere,
-        lead_ohms=LeadOhms.equal(_WIRE_OHMS + limits["on_ohm"][0]),
-        input_ohms=max(_INPUT_OHMS, 10.0 * sensor.electronics.pulldown_ohms),
+        lead_ohms=LeadOhms.equal(lead),
+        input_ohms=inputs,
+        pulldown_ohms=pulldown,
     )
     fitted = replace(sensor, electronics=electronics)
     largest, most = max(fitted.radial_amperes, fitted.angular_amperes), 1e-3 * limits["most_ma"][1]
@@ -227,7 +235,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
             f"the switches of a board carry at most {1e3 * most:g} mA, and {sensor.name} draws "
             f"{1e3 * largest:.3g} mA: give the sheets a higher resistance, or a lower supply_v"
         )
-    return BoardCircuit(board, facts, fitted, shunt, other)
+    return BoardCircuit(board, facts, fitted, shunt, resistor, other)
 
 
 def part_catalog() -> dict[str, Any]:
@@ -292,7 +300,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         yield two("R", "resistor", "1 kohm", f"S_{e}", f"ADC_{e}")
         yield two("C", "filter", "470 pF", f"ADC_{e}", "GND")
         if e in "CD":
-            yield two("R", "precise", ohms_text(parts.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
+            yield two("R", "precise", ohms_text(circuit.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
     group = "converter"
     inputs = [f"ADC_{name}" for name in "ABCDIS"]
     if converter is not None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
+from coneskin.skin.firmware.board_circuit import PIN_OHMS
 from coneskin.skin.firmware.boards import boards
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.source import Openable
@@ -173,7 +174,10 @@ def _words(
         "gain": SENSE_GAIN,
         "bias": electronics.current_zero * SENSE_GAIN * shunt_ohms(electronics),
         "reference": electronics.adc_volts,
-        "pulldown": electronics.pulldown_ohms,
+        "pulldown": round(
+            1.0 / (1.0 / (electronics.pulldown_ohms - 3.0) - 1.0 / electronics.input_ohms) - PIN_OHMS - 1.0
+        ),
+        "pin": PIN_OHMS,
         "input": electronics.input_ohms,
         **(parts or {}),
     }
