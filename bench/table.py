@@ -105,5 +105,6 @@ BENCHES = {
     "view-hours": Bench("bench.view.hours", "A GPU."),
     "view-endurance": Bench("bench.view.endurance", "Browsers: nobody looks at the page."),
     "ur-clients": Bench("bench.clients.trials", "A real controller's answers to the same clients."),
+    "ur-corpus": Bench("bench.clients.corpus", "What a real controller says of the same programs."),
     "sim-ur": Bench("bench.clients.sim_ur", _SIMULATED_ARM),
 }

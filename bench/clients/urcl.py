@@ -14,19 +14,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bench.faults.setup import give_precedence
 from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL
 from coneskin.robot.sim.process import SimulatedController, free_host
 
 #: joint positions with which Universal Robots' own simulator starts [rad]
 START_Q = (-1.6006, -1.7271, -2.2030, -0.8080, 1.5951, -0.0310)
 TEST_TIMEOUT = 90.0  # s
+_URSIM = ("--control", "disabled")  # as URSim is, against which the library is tested
 #: program of tests -> its arguments, and options of the controller
 TEST_PROGRAMS: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
     ("primary_client_test_headless", (), {}),
     ("rtde_tests", (), {}),
-    ("dashboard_client_g5_tests", (), {"remote_control": False}),
-    ("dashboard_client_g5_tests", (), {"remote_control": False, "version": "3.15"}),
+    ("dashboard_client_g5_tests", (), {"options": _URSIM}),
+    ("dashboard_client_g5_tests", (), {"version": "3.15"}),
     ("ur_driver_deprecated_constructor_test", (), {}),
     *(
         (name, ("--headless", headless), {})
@@ -87,12 +87,9 @@ class Trial(NamedTuple):
 
 @contextmanager
 def controller(**options: Any) -> Iterator[SimulatedController]:
-    """Run a controller as the library's tests expect one: a UR5e, before other processes, as hardware does."""
+    """Run a controller as the library's tests expect one, a UR5e."""
     model = "UR5" if options.get("version") == "3.15" else "UR5e"
     with SimulatedController(model, free_host(), START_Q, protective_stop="stop", **options) as simulated:
-        children = Path(f"/proc/{simulated.pid}/task/{simulated.pid}/children")
-        for task in (simulated.pid, *map(int, children.read_text().split() if children.exists() else ())):
-            give_precedence(task)
         yield simulated
 
 
@@ -204,7 +201,7 @@ def example(program: Path, arguments: Sequence[str], source: Path) -> Trial:
     label = "URCL examples"
     if not os.access(program, os.X_OK):
         return Trial(label, program.name, "skip", 0.0, "it is not built")
-    with robot(source, {"remote_control": False}) as host:
+    with robot(source, {"options": _URSIM}) as host:
         begin = time.monotonic()
         command = [str(program), host, *arguments]
         try:

@@ -82,9 +82,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--control",
-        choices=("local", "remote"),
+        choices=("local", "remote", "disabled"),
         default="remote",
-        help="control at the start; in local control no program and no command is taken (%(default)s)",
+        help="control at the start; in local control no program and no command is taken. With remote control disabled "
+        "in its settings, as in URSim, it takes all and says that it is not in remote control (%(default)s)",
     )
     add(
         "--closed",
@@ -137,7 +138,8 @@ def _serve(args: argparse.Namespace) -> int:
         program=_read(args.program) if args.program else "",
         programs=_folder(args.programs) if args.programs else None,
         external_control=_address(args.external_control),
-        remote_control=args.control == "remote",
+        remote_control=args.control != "local",
+        remote_enabled=args.control != "disabled",
         closed=frozenset(args.closed),
         fieldbus=args.fieldbus,
     )

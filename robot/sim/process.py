@@ -67,7 +67,6 @@ class SimulatedController(OwnedProcess):
         program: URScript file that the dashboard command ``play`` starts.
         programs: folder of the programs and installations that the dashboard can load.
         external_control: HOST:PORT at which such a program asks for the script of its External Control node.
-        remote_control: whether the robot starts under remote control.
         plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
             follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].
@@ -94,7 +93,6 @@ class SimulatedController(OwnedProcess):
         program: Path | None = None,
         programs: Path | None = None,
         external_control: str = "127.0.0.1:50002",
-        remote_control: bool = True,
         plant: socket.socket | None = None,
         ready_within: float = 15.0,
         options: Sequence[str] = (),
@@ -111,14 +109,8 @@ class SimulatedController(OwnedProcess):
         ]
         if start_q is not None:
             self._arguments += ["--start-q-deg", *(repr(math.degrees(q)) for q in start_q)]
-        if log is not None:
-            self._arguments += ["--log", str(log)]
-        if program is not None:
-            self._arguments += ["--program", str(program)]
-        if programs is not None:
-            self._arguments += ["--programs", str(programs)]
-        if not remote_control:
-            self._arguments += ["--control", "local"]
+        for option, path in (("--log", log), ("--program", program), ("--programs", programs)):
+            self._arguments += [] if path is None else [option, str(path)]
         self._arguments += options
 
     def __enter__(self) -> SimulatedController:
@@ -134,8 +126,9 @@ class SimulatedController(OwnedProcess):
         )
         if self._plant is not None:
             self._plant.close()
+        assert process.stdout is not None
         lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-        threading.Thread(target=lambda: lines.put(_first_line(process)), daemon=True).start()
+        threading.Thread(target=lambda line: lines.put(line()), args=[process.stdout.readline], daemon=True).start()
         try:
             line = lines.get(timeout=self.ready_within)
         except queue.Empty:
@@ -195,7 +188,3 @@ class SimulatedController(OwnedProcess):
                 raise RobotTimeout(f"the simulated arm still moves after {timeout:g} s")
             time.sleep(0.005)
         return state
-
-
-def _first_line(process: subprocess.Popen[str]) -> str:
-    return process.stdout.readline() if process.stdout is not None else ""

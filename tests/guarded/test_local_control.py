@@ -23,7 +23,9 @@ from .test_external_control import send  # noqa: E402
 @pytest.mark.parametrize("control", ["internal", "external"])
 def test_a_guard_does_not_start_on_a_controller_in_local_control(control):
     with (
-        SimulatedController(model="UR5e", host=free_host(), start_q=START, remote_control=False) as controller,
+        SimulatedController(
+            model="UR5e", host=free_host(), start_q=START, options=("--control", "local")
+        ) as controller,
         pytest.raises(RobotRefused, match=r"local control: it refuses every stop .* Choose Remote Control"),
         guard(scene_for(controller, control=control)),
     ):

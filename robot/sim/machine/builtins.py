@@ -77,10 +77,21 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, Valu
         """Forget what statements of interpreter mode have defined."""
         self._program.interpreter.clear()
 
-    def popup(self, s: Any = "", title: Any = "Popup", warning: Any = False, error: Any = False, **_: Any) -> None:
+    def popup(
+        self, s: Any = "", title: Any = "Popup", warning: Any = False, error: Any = False, *_: Any, **__: Any
+    ) -> None:
         """Write a line to the log, and tell it to the clients; nobody is there to close a blocking one."""
         self._host.log("popup", text=show(s), title=show(title))
         self._host.tell(PopupNotice(show(title), show(s), bool(warning), bool(error)))
+
+    def request_boolean_from_primary_client(self, message: Any = "") -> Wait:
+        """Wait for an answer from a pendant that is not there."""
+        self._tell_not_simulated(f"an answer from the pendant, for which the program waits: {show(message)}")
+        while True:
+            yield
+
+    request_float_from_primary_client = request_integer_from_primary_client = request_boolean_from_primary_client
+    request_string_from_primary_client = request_boolean_from_primary_client
 
     # kinematics
 
@@ -233,5 +244,6 @@ _READINGS: dict[str, Callable[[ScriptHost], Any]] = {
     "get_joint_torques": lambda _: Array(_NOT_SIMULATED),
     "get_freedrive_status": lambda _: 0,  # it is not restricted by a position close to a limit
 }
+_READINGS["tool_pose"] = _READINGS["get_actual_tcp_pose"]  # its name on CB3
 for _name, _read in _READINGS.items():
     _add_reading(_name, _read)

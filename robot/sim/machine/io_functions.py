@@ -271,10 +271,12 @@ _ABSENT_DEVICES: tuple[tuple[Any, str], ...] = (
         path_offset_set_max_offset pause_on_error_code position_deviation_warning powerdown reset_revolution_counter
         screw_driving set_base_acceleration set_baselight_iec set_baselight_off set_baselight_solid
         set_conveyor_tick_count set_euromap_output set_euromap_runstate_dependent_choice
-        set_runstate_configurable_digital_output_to_value set_runstate_gp_boolean_output_to_value
-        set_runstate_standard_analog_output_to_value set_runstate_standard_digital_output_to_value
-        set_runstate_tool_digital_output_to_value stop_conveyor_tracking tool_wrench_limit_disable
-        tool_wrench_limit_set track_conveyor_circular track_conveyor_linear write_port_bit write_port_register""",
+        set_runstate_configurable_digital_output_to_value set_runstate_configurable_digital_outputs
+        set_runstate_gp_boolean_output_to_value set_runstate_outputs set_runstate_standard_analog_output_to_value
+        set_runstate_standard_digital_output_to_value set_runstate_standard_digital_outputs
+        set_runstate_tool_digital_output_to_value set_runstate_tool_digital_outputs stop_conveyor_tracking
+        tool_wrench_limit_disable tool_wrench_limit_set track_conveyor_circular track_conveyor_linear write_port_bit
+        write_port_register""",
     ),
 )
 _INPUT_ACTIONS = ("default", "freedrive")
@@ -283,6 +285,7 @@ _FREEDRIVE_PARAMETERS = {"freeAxes": None, "feature": None}
 NO_EFFECT: dict[str, Mapping[str, range | tuple[Any, ...] | None]] = {
     **{name: {} for name in ("end_force_mode", "end_freedrive_mode", "end_teach_mode", "teach_mode", "zero_ftsensor")},
     **dict.fromkeys(("freedrive_mode", "freedrive_mode_no_incorrect_payload_check"), _FREEDRIVE_PARAMETERS),
+    "set_analog_inputrange": {"port": range(4), "range": range(5)},
     "set_configurable_digital_input_action": {"port": range(8), "action": _INPUT_ACTIONS},
     "set_gp_boolean_input_action": {"port": range(128), "action": _INPUT_ACTIONS},
     "set_input_actions_to_default": {},
@@ -297,6 +300,7 @@ NO_EFFECT: dict[str, Mapping[str, range | tuple[Any, ...] | None]] = {
         "tx_idle_chars": range(41),
     },
     "set_tool_digital_input_action": {"port": range(2), "action": _INPUT_ACTIONS},
+    "varmsg": {"name": None, "value": None},
 }
 for _name, _parameters in NO_EFFECT.items():
     _add_without_effect(_name, _parameters)

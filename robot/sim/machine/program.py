@@ -20,8 +20,7 @@ from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError, call_met
 
 from .builtins import Builtins
 from .io_functions import AbsentHandle
-from .script_host import ScriptHost
-from .script_socket import ScriptSocket
+from .script_host import ScriptHost, ScriptSocket
 from .socket_functions import RemoteHandle
 
 _MAX_STEPS = 200  # turns of loops, and calls, of a thread in one cycle: its time slice

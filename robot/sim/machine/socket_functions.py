@@ -23,8 +23,7 @@ from xml.parsers.expat import ExpatError
 from coneskin.robot.sim.urscript.value_functions import text_of
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 
-from .script_host import CallingProgram, ScriptHost
-from .script_socket import ScriptSocket
+from .script_host import CallingProgram, ScriptHost, ScriptSocket
 
 _MAX_SOCKETS = 32  # of one program, at once; an assumption
 _MAX_VALUES = 30  # of one read
@@ -39,10 +38,16 @@ class SocketFunctions:
 
     _host: ScriptHost
     _program: CallingProgram
+    _tell_not_simulated: Callable[[str], None]
 
     def socket_open(self, address: Any, port: Any, socket_name: Any = _SOCKET_NAME) -> Generator[None, None, bool]:
         """Connect to a server; return whether that worked."""
-        where = _may_connect(str(address), self._host.beyond)
+        try:
+            where = _may_connect(str(address), self._host.beyond)
+        except ScriptError as exc:
+            self._tell_not_simulated(str(exc))
+            yield
+            return False
         if not 0 < int(port) < 65536:
             raise ScriptError(f"a port is from 1 to 65535, got {show(port)}")
         self.socket_close(socket_name)

@@ -108,6 +108,7 @@ class Options:
         external_control: host and port from which a program takes the script of its External Control node.
         remote_control: whether the robot starts under remote control. In local control it takes no program, and no
             command that changes anything.
+        remote_enabled: whether it has these at all; without, as URSim, it takes all, and says "not in remote control".
         closed: services that are switched off, as all are on a robot that comes from the factory since 5.10.
         watchdog_delay: by which the watchdog on an input is late [s].
         deceleration: of the leading joint where nothing commands one, as in a pause; an assumption [rad/s^2].
@@ -124,6 +125,7 @@ class Options:
     programs: Path | None = None
     external_control: tuple[str, int] = ("127.0.0.1", 50002)
     remote_control: bool = True
+    remote_enabled: bool = True
     closed: frozenset[str] = frozenset()
     fieldbus: bool = False
     watchdog_delay: float = 0.0

@@ -152,11 +152,6 @@ _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
 _DEFAULT_MOTION = (math.radians(60.0), math.radians(80.0), 0.25, 1.2, 0.25)  # joint and tool v and a, and their radius
 
 
-def _robot_type(model: ArmModel) -> int:
-    """Return the number of an arm's size in the client interface; 0 where it has none."""
-    return _ROBOT_TYPES.get(model.name.removesuffix("e"), 0)
-
-
 def _encode_state(controller: Controller) -> bytes:
     """Return the packet of the present state."""
     return _pack(ROBOT_STATE, b"".join(_changing(controller)))
@@ -218,7 +213,8 @@ def _configuration(model: ArmModel, major: int) -> bytes:
     motion = [value for speed in model.joint_speed for value in (speed, JOINT_ACCELERATION)]
     table = (*model.a, *model.d, *model.alpha, *model.theta)
     numbers = struct.pack(">53d", *limits, *motion, *_DEFAULT_MOTION, *table)
-    box = struct.pack(">iiii", _BOARD_VERSION, _BOX, _robot_type(model), _ROBOT_SUBTYPES.get(major, 3))
+    size = _ROBOT_TYPES.get(model.name.removesuffix("e"), 0)
+    box = struct.pack(">iiii", _BOARD_VERSION, _BOX, size, _ROBOT_SUBTYPES.get(major, 3))
     return _sub(_CONFIGURATION, numbers + box)
 
 

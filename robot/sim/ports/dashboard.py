@@ -81,7 +81,7 @@ class Dashboard:
             "get robot model": lambda _: self._c.arm.model.name.removesuffix("e"),
             "get serial number": lambda _: SERIAL_NUMBER,
             "getUserRole": lambda _: self._i.user_role,
-            "is in remote control": lambda _: str(self._c.remote_control).lower(),
+            "is in remote control": lambda _: str(self._c.remote_control and self._c.options.remote_enabled).lower(),
             "isProgramSaved": lambda _: f"true {self._i.program_name}",
             "load": self._load,
             "load installation": self._load_installation,

@@ -80,10 +80,7 @@ _BINARY_OPERATORS = (
     {"*": "_multiply({}, {})", "/": "_divide({}, {})", "%": "_modulo({}, {})"},
 )
 _COMPARISON_LEVEL = 2
-_NOT_SIMULATED = {
-    "time",
-    *(f"request_{kind}_from_primary_client" for kind in ("boolean", "float", "integer", "string")),
-}
+_NOT_SIMULATED = {"time"}
 #: words that can be no variable
 _RESERVED_WORDS = {"def", "sec", "thread", "end", "if", "elif", "else", "while", "switch", "case", "default", "return"}
 _RESERVED_WORDS |= {"break", "continue", "halt", "global", "local"}

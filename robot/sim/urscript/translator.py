@@ -29,7 +29,7 @@ from typing import Any
 from .syntax import ExpressionParser, line_error
 from .values import ScriptError
 
-MAX_LENGTH = 256_000  #: characters of a program; that of ur_rtde has 50 000
+MAX_LENGTH = 512_000  #: characters of a program; an export of PolyScope has up to 370 000
 #: first word of a line that an ``end`` must close, and that ``end``; both where one line has it all, too
 _BLOCK_START = re.compile(r"(?:^|:)\s*(?:def|sec|thread|if|while|switch)\b")
 _BLOCK_END = re.compile(r"(?<!\.)\bend\b(?!\s*[=(.])")

@@ -95,6 +95,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "get_target_tcp_speed_along_path": "norm(get_target_tcp_speed_along_path()) == 0",
         "get_target_tcp_speed": "norm(get_target_tcp_speed()) == 0",
         "get_target_waypoint": f"get_target_waypoint() == {_LEVEL}",
+        "tool_pose": f"tool_pose() == {_LEVEL}",
         "get_tcp_offset": "set_tcp(p[0, 0, 0.1, 0, 0, 0])\nget_tcp_offset() == p[0, 0, 0.1, 0, 0, 0]",
         "get_tool_accelerometer_reading": "length(get_tool_accelerometer_reading()) == 3",
         "get_tool_current": "get_tool_current() == 0",
@@ -125,6 +126,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
     },
     "installation, as PolyScope writes it before a program": {
         "set_configurable_digital_input_action": 'set_configurable_digital_input_action(7, "freedrive")\nTrue',
+        "set_analog_inputrange": "set_analog_inputrange(0, 0)\nTrue",
+        "varmsg": 'varmsg("x", 1)\nTrue',
         "set_gp_boolean_input_action": 'set_gp_boolean_input_action(127, "default")\nTrue',
         "set_input_actions_to_default": "set_input_actions_to_default()\nTrue",
         "set_safety_mode_transition_hardness": "set_safety_mode_transition_hardness(1)\nTrue",
@@ -193,7 +196,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "rpc_factory": 'rpc_factory("xmlrpc", "http://127.0.0.1:1/RPC2").closeXMLRPCClientConnection() == None',
         "socket_close": "socket_close()\nTrue",
         "socket_get_var": 'socket_get_var("x") == 0',
-        "socket_open": 'socket_open("127.0.0.1", 1) == False',
+        "socket_open": 'socket_open("127.0.0.1", 1) == False and socket_open("192.0.2.1", 80) == False',
         "socket_read_ascii_float": 'socket_read_ascii_float(2, "a", 0.01)[0] == 0',
         "socket_read_binary_integer": 'socket_read_binary_integer(2, "a", 0.01) == [0, -1, -1]',
         "socket_read_byte_list": 'socket_read_byte_list(2, "a", 0.01) == [0, -1, -1]',
@@ -220,7 +223,12 @@ EXAMPLES: dict[str, dict[str, str]] = {
         "interpreter_mode": "thread t():\nend_interpreter()\nend\nrun t()\ninterpreter_mode()\nTrue",
         "end_interpreter": "end_interpreter()\nTrue",
         "clear_interpreter": "clear_interpreter()\nTrue",
-        "popup": 'popup("here", title="Popup #1", blocking=False)\nTrue',
+        "popup": 'popup("here", title="Popup #1", blocking=False)\npopup("a", "b", False, True, True)\nTrue',
+        **{
+            f"request_{kind}_from_primary_client": f"thread t():\nrequest_{kind}_from_primary_client('a')\n"
+            "write_output_integer_register(1, 1)\nend\nrun t()\nsleep(0.1)\nread_output_integer_register(1) == 0"
+            for kind in ("boolean", "float", "integer", "string")  # nobody answers
+        },
         "protective_stop": "not False or protective_stop()",  # it would not return: see test_safety_system.py
         "sleep": "sleep(0.01)\nTrue",
         "sync": "sync()\nTrue",

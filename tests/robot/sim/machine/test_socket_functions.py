@@ -11,7 +11,7 @@ import pytest
 
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.script_socket import _MAX_READS, _MAX_UNREAD
+from coneskin.robot.sim.machine.script_host import _MAX_READS, _MAX_UNREAD
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.urscript.translator import translate
 

@@ -27,7 +27,6 @@ from coneskin.robot.sim.ports.client_interface import (
     _encode_state,
     _encode_version,
     _realtime_size,
-    _robot_type,
 )
 
 _TIME = bytes(8)
@@ -162,9 +161,9 @@ def test_the_arm_is_named_as_recorded():
     assert numbers[-4:] == (6, 4, 1, 3)
     assert numbers[29:35] == (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
     assert struct.unpack(">24d", state[5][24:216])[6:12] == (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
-    assert [_robot_type(Controller(Options(model=name)).arm.model) for name in ("ur3e", "ur10", "ur16e", "ur20")] == [
-        *(3, 2, 4, 7)
-    ]
+    for name, number in {"ur3e": 3, "ur10": 2, "ur16e": 4, "ur8 long": 6, "ur20": 7}.items():
+        state = sub_packages(_encode_first_state(Controller(Options(model=name))))
+        assert struct.unpack(">ii", state[6][-8:]) == (number, 3)
 
 
 @pytest.mark.parametrize(("version", "size"), [((5, 25), 1220), ((5, 9), 1140), ((5, 4), 1116), ((3, 15), 1220)])

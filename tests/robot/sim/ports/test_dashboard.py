@@ -154,6 +154,8 @@ def test_local_control_refuses_what_acts_and_answers_questions() -> None:
     assert local.say("is in remote control") == "true"
     assert local.say("stop").startswith("Command is not allowed")
     assert Dashboard(local.interface).answer("stop") == "Stopped"
+    ursim = Console(remote_enabled=False)
+    assert (ursim.say("is in remote control"), ursim.say("stop")) == ("false", "Stopped")
 
 
 def test_a_client_takes_its_leave(console: Console) -> None:
