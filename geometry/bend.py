@@ -20,8 +20,7 @@ from .frustum import sinc
 from .pose import Vector
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from coneskin.core.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +81,7 @@ class BentStrip:
             (nx + k * dx, ny + k * dy, nz + k * dz),
         )
 
-    def feet(
-        self, points: NDArray[np.float64], low: float, high: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def feet(self, points: Floats, low: float, high: float) -> tuple[Floats, Floats]:
         """Return where the nearest feet of points lie along end 1 [m], and how far points are from the rulings there.
 
         Args:

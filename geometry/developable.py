@@ -29,8 +29,9 @@ from .placed_frustum import PlacedFrustum
 from .pose import Pose, Vector
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from coneskin.core.arrays import Floats, Ints
 
 _WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
 _MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
@@ -187,7 +188,7 @@ class Developable(PlacedFrustum):
         u, phi, distance = self._feet(np.array([self.link_frustum.inverse().apply(p_link)]))
         return float(u[0]), float(phi[0]), float(distance[0])
 
-    def rulings(self, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def rulings(self, phi: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Return the points of end 1 [m], the directions of the rulings and the normals, in the frame of the side.
 
         Args:
@@ -206,7 +207,7 @@ class Developable(PlacedFrustum):
         at, way, normal = _frames_along(self._strips, number, (phi - np.array(self._starts)[number]) * share[number])
         return at + self.lift * normal, way, normal
 
-    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
         """Return points [m] and outward unit normals in the link's frame, shapes (..., 3)."""
         import numpy as np
 
@@ -214,7 +215,7 @@ class Developable(PlacedFrustum):
         base, way, normal = self.rulings(phi)
         return self.link_frustum.apply_all(base + u[..., None] * way), normal @ np.array(self.link_frustum.rotation).T
 
-    def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def locate_all(self, points: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Return u [m], phi [rad] and the signed distance [m] of many points, the inverse of ``place``."""
         import numpy as np
 
@@ -223,9 +224,7 @@ class Developable(PlacedFrustum):
         shape = points.shape[:-1]
         return u.reshape(shape), phi.reshape(shape), distance.reshape(shape)
 
-    def _feet(
-        self, points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _feet(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Return u, phi and the distance of points in the frame of the side, shape (n, 3)."""
         import numpy as np
 
@@ -373,9 +372,7 @@ def _bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool
     return tuple(parts)
 
 
-def _frames_along(
-    strips: Sequence[BentStrip], number: NDArray[np.int64], along: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _frames_along(strips: Sequence[BentStrip], number: Ints, along: Floats) -> tuple[Floats, Floats, Floats]:
     """Return points of end 1 [m], rulings and normals for many places: shapes (..., 3).
 
     Args:

@@ -12,17 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coneskin.core.arrays import frozen
+from coneskin.core.arrays import Floats, frozen
 from coneskin.core.errors import GeometryError
 
 from .mesh import Mesh
 from .placed_frustum import PlacedFrustum
 from .pose import Vector
 from .ray_casting import RayCaster
-
-Floats = NDArray[np.float64]
 
 
 def bridge_holes(height: Floats, step: float, arc: float, max_bridge: float, around: bool = True) -> Floats:

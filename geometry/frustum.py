@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from coneskin.core.arrays import Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ class Frustum:
         """Return the angle [rad], moved by whole turns, that lies within half a turn of span / 2."""
         return angle - math.tau * round((angle - 0.5 * span) / math.tau)
 
-    def points(self, u: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+    def points(self, u: ArrayLike, phi: ArrayLike) -> Floats:
         """Return the points of the side for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""
         import numpy as np
 
@@ -155,7 +156,7 @@ class Frustum:
         rho = ((s - u) * self.radius1 + u * self.radius2) / s
         return np.stack([rho * np.cos(phi), rho * np.sin(phi), u * self.cos_half_angle], axis=-1)
 
-    def normals(self, phi: ArrayLike) -> NDArray[np.float64]:
+    def normals(self, phi: ArrayLike) -> Floats:
         """Return the outward unit normals for an array of azimuths [rad]: shape (..., 3)."""
         import numpy as np
 

@@ -14,16 +14,15 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coneskin.core.arrays import frozen
+from coneskin.core.arrays import Bools, Floats, Ints, frozen
 from coneskin.core.errors import MeshError, MissingExtra
 from coneskin.core.files import read_file
 
 from .pose import Pose
 
 
-def _outermost_points(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outermost_points(points: Floats) -> Floats:
     """Return those of points [m], shape (n, 3), that are corners of their hull: as far as all reach, these reach.
 
     All are returned where the hull has no volume.
@@ -86,9 +85,6 @@ def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
     return asset
 
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}  #: metres in one unit
 SUFFIXES = (".stl", ".obj", ".dae", ".ply")
 MAX_SIZE = 100_000_000  # bytes of a file; 2 million triangles, and a link is modelled with 10 000
@@ -112,7 +108,7 @@ class Mesh:
     """
 
     vertices: Floats
-    faces: Indices
+    faces: Ints
     source: str = "mesh"
     unit: str = "m"
     notes: tuple[str, ...] = ()
@@ -158,12 +154,12 @@ class Mesh:
         """Return the same mesh in the outer frame of a pose."""
         return Mesh(pose.apply_all(self.vertices), self.faces, self.source, self.unit, self.notes)
 
-    def part(self, chosen: NDArray[np.bool_]) -> Mesh:
+    def part(self, chosen: Bools) -> Mesh:
         """Return the mesh of some faces, with the corners that they use; ``chosen`` has the shape (m,)."""
         used, faces = _numbered_anew(self.faces[chosen], len(self.vertices))
         return Mesh(self.vertices[used], faces, self.source, self.unit, self.notes)
 
-    def embree_intersector(self) -> Callable[[Floats, Floats], Indices] | None:
+    def embree_intersector(self) -> Callable[[Floats, Floats], Ints] | None:
         """Return a function that casts rays with embree, through trimesh; None without the package embreex.
 
         The function takes origins [m] and directions, both of shape (n, 3), and returns the index of the first face hit
@@ -177,7 +173,7 @@ class Mesh:
                 return None
             body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
             self._kept["embree"] = RayMeshIntersector(body).intersects_first
-        first: Callable[[Floats, Floats], Indices] = self._kept["embree"]
+        first: Callable[[Floats, Floats], Ints] = self._kept["embree"]
         return first
 
 
@@ -303,7 +299,7 @@ def make_mesh(
     return Mesh(welded, faces, source, unit, tuple(notes))
 
 
-def _check_corners(faces: Indices, count: int, source: str) -> None:
+def _check_corners(faces: Ints, count: int, source: str) -> None:
     """Refuse faces that refer to other than so many corners, and no faces at all.
 
     Raises:
@@ -316,7 +312,7 @@ def _check_corners(faces: Indices, count: int, source: str) -> None:
         raise MeshError(f"{source}: a face refers to corner {low if low < 0 else high}, there are {count}")
 
 
-def _edge_products(vertices: Floats, faces: Indices) -> Floats:
+def _edge_products(vertices: Floats, faces: Ints) -> Floats:
     """Return the vector products of two edges of each face, shape (3, m); a coordinate at a time, which is faster."""
     columns = [np.ascontiguousarray(column) for column in vertices.T]
     a, b, c = (np.ascontiguousarray(column) for column in faces.T)
@@ -324,7 +320,7 @@ def _edge_products(vertices: Floats, faces: Indices) -> Floats:
     return np.stack([ab[i - 2] * ac[i - 1] - ab[i - 1] * ac[i - 2] for i in range(3)])
 
 
-def _numbered_anew(faces: Indices, count: int) -> tuple[NDArray[np.bool_], Indices]:
+def _numbered_anew(faces: Ints, count: int) -> tuple[Bools, Ints]:
     """Return which of so many corners faces use, shape (count,), and the faces, numbered among those."""
     used = np.zeros(count, bool)
     used[faces] = True
@@ -346,7 +342,7 @@ def refuse_entities(data: bytes, path: Path) -> None:
         raise MeshError(f"{path}: an XML text that defines entities is not read; export the file without them")
 
 
-def _read(path: Path, data: bytes) -> tuple[Floats, Indices]:
+def _read(path: Path, data: bytes) -> tuple[Floats, Ints]:
     """Read the corners and faces of all parts of a file, in its own unit; no file that it names is opened."""
     import trimesh
 
@@ -361,7 +357,7 @@ def _read(path: Path, data: bytes) -> tuple[Floats, Indices]:
         raise MeshError(f"{path}: not a readable {path.suffix[1:].upper()} file ({reason[0]})") from error
     scene = loaded if isinstance(loaded, trimesh.Scene) else trimesh.Scene([loaded])
     corners: list[Floats] = []
-    faces: list[Indices] = []
+    faces: list[Ints] = []
     count = 0
     for node in scene.graph.nodes_geometry:
         matrix, name = scene.graph[node]

@@ -12,8 +12,9 @@ from .frustum import Frustum
 from .pose import Pose, Vector
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from coneskin.core.arrays import Floats
 
     from .bend import Bend
 
@@ -44,7 +45,7 @@ class PlacedFrustum:
         """Return u [m], phi [rad] and the signed distance [m] of one point of the link; ``locate_all``: of many."""
         return self.frustum.locate(*self.link_frustum.inverse().apply(p_link))
 
-    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def place(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
         """Return points and outward unit normals in the link's frame, for numbers or arrays.
 
         Args:
@@ -60,7 +61,7 @@ class PlacedFrustum:
         normals = np.broadcast_to(self.frustum.normals(phi) @ np.array(self.link_frustum.rotation).T, points.shape)
         return points, normals.copy()
 
-    def locate_all(self, points: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def locate_all(self, points: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Return u [m], phi [rad] and the signed distance [m] of many points, the inverse of ``place``.
 
         Args:

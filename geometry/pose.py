@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from coneskin.core.arrays import Floats
 
 Vector = tuple[float, float, float]
 
@@ -133,11 +132,11 @@ class Pose:
         t = self.translation
         return x + t[0], y + t[1], z + t[2]
 
-    def apply_all(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def apply_all(self, points: Floats) -> Floats:
         """Return points of the inner frame [m], shape (..., 3), seen from the outer one."""
         import numpy as np
 
-        moved: NDArray[np.float64] = points @ np.array(self.rotation).T + np.array(self.translation)
+        moved: Floats = points @ np.array(self.rotation).T + np.array(self.translation)
         return moved
 
     def inverse(self) -> Pose:

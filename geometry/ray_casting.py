@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats, Ints
 
 from .mesh import Mesh
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class RayCaster:
@@ -30,7 +28,7 @@ class RayCaster:
         self._normals = tuple(np.ascontiguousarray(column) for column in normals.T)
         self._heights = np.einsum("ij,ij->i", mesh.vertices[mesh.faces[:, 0]], normals)
 
-    def cast(self, origins: Floats, directions: Floats) -> tuple[Floats, Indices]:
+    def cast(self, origins: Floats, directions: Floats) -> tuple[Floats, Ints]:
         """Find where rays first meet the mesh, from either side of a face.
 
         Args:
@@ -86,14 +84,14 @@ class _GridRayCaster:
         self._faces = face[order]
         self._starts = np.searchsorted(flat[order], np.arange(int(self._shape.prod()) + 1))
 
-    def _cells_of(self, points: Floats) -> Indices:
+    def _cells_of(self, points: Floats) -> Ints:
         cells = np.floor((points - self._low) / self._cell).astype(np.int64)
         return np.asarray(np.clip(cells, 0, self._shape - 1))
 
-    def _flat(self, ijk: Indices) -> Indices:
+    def _flat(self, ijk: Ints) -> Ints:
         return np.asarray((ijk[:, 0] * self._shape[1] + ijk[:, 1]) * self._shape[2] + ijk[:, 2])
 
-    def first_faces(self, origins: Floats, directions: Floats) -> Indices:
+    def first_faces(self, origins: Floats, directions: Floats) -> Ints:
         """Return the index of the first face hit by each ray, -1 for none; shapes as in ``RayCaster.cast``."""
         origins, directions = np.asarray(origins, float), np.asarray(directions, float)
         best = np.full(len(origins), np.inf)
@@ -122,9 +120,7 @@ class _GridRayCaster:
             alive = alive[within & (reach < best[alive])]
         return face
 
-    def _test(
-        self, rays: Indices, cells: Indices, origins: Floats, directions: Floats, best: Floats, face: Indices
-    ) -> None:
+    def _test(self, rays: Ints, cells: Ints, origins: Floats, directions: Floats, best: Floats, face: Ints) -> None:
         """Test the faces in each ray's cell (Moeller and Trumbore 1997); keep the nearest in best and face."""
         flat = self._flat(cells)
         counts = self._starts[flat + 1] - self._starts[flat]

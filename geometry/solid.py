@@ -11,16 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError, MissingExtra
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-Floats = NDArray[np.float64]
 
 
 def widest_nearby(values: Floats, rows: int, columns: int) -> Floats:

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError
 
 FlatPoint = tuple[float, float]
@@ -76,7 +76,7 @@ class PathSegment:
         reach, angle = ratio * self.chord, 0.5 * (self.heading(0.0) + self.heading(fraction))
         return self.start[0] + reach * math.cos(angle), self.start[1] + reach * math.sin(angle)
 
-    def along(self, count: int) -> NDArray[np.float64]:
+    def along(self, count: int) -> Floats:
         """Return count + 1 points at equal distances, both ends included, shape (count + 1, 2) [m]."""
         sweep, fractions = self.sweep, np.linspace(0.0, 1.0, count + 1)
         ratios = np.sin(0.5 * sweep * fractions) / math.sin(0.5 * sweep) if abs(sweep) > 1e-9 else fractions

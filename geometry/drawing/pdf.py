@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError
 
 from .cut_sheet import LINE_COLOURS, CutSheet
@@ -118,9 +118,7 @@ def _tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> _Pag
     return min(options, key=lambda option: len(option.cells))
 
 
-def _spread(
-    points: NDArray[np.float64], extent: tuple[float, float, float, float], width: float, height: float
-) -> _PageTiling:
+def _spread(points: Floats, extent: tuple[float, float, float, float], width: float, height: float) -> _PageTiling:
     x0, y0, x1, y1 = extent
     window_x, window_y = width - 2.0 * _SIDE_MARGIN, height - _TOP_MARGIN - _BOTTOM_MARGIN
     columns, rows = max(1, math.ceil((x1 - x0) / window_x)), max(1, math.ceil((y1 - y0) / window_y))

@@ -13,17 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats
+
 from .intervals import balance_borders, choose_intervals, longest_intervals
 from .profile import RadialProfile
 from .side import StraightSide, azimuth_columns, fit_side
 from .touch_weights import TouchWeights
 
-Floats = NDArray[np.float64]
 Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
 
 
 def _largest_region(
-    good: NDArray[np.bool_], rows: int = 1, columns: int = 1, exact: bool = False, worth: Floats | None = None
+    good: Bools, rows: int = 1, columns: int = 1, exact: bool = False, worth: Floats | None = None
 ) -> Region | None:
     """Return the largest rectangle of good cells on a grid whose columns go round.
 
@@ -96,7 +97,7 @@ def _largest(runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, 
 
 
 def _worthiest(
-    runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, most: int, worth: NDArray[np.float64]
+    runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, most: int, worth: Floats
 ) -> Region | None:
     """Return the region of the cells that count most, each of them as much as ``worth`` says."""
     count, around = worth.shape
@@ -267,7 +268,7 @@ def largest_partial_wrap(
     return best
 
 
-def _neighbourhood(profile: RadialProfile, side: StraightSide, gap: float) -> NDArray[np.bool_]:
+def _neighbourhood(profile: RadialProfile, side: StraightSide, gap: float) -> Bools:
     """Return the cells of a side and those nearer to it than a gap [m], shape (k, p)."""
     cells = np.zeros(profile.radius.shape, bool)
     rows = math.ceil(gap / profile.step)
@@ -284,7 +285,7 @@ _TESTED_HEIGHTS = 4  # heights at which the space above a cell is tested
 
 def _clashing_cells(
     profile: RadialProfile, other: RadialProfile, side: StraightSide, thickness: float, gap: float
-) -> NDArray[np.bool_]:
+) -> Bools:
     """Return the cells above which the space of a sheet to come meets that of a side which is there, shape (k, p).
 
     The side lies on the profile ``other``; thickness of both sheets and least gap between them [m].

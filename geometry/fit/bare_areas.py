@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats
 from coneskin.geometry.mesh import Mesh
 
 from .axis_plan import AxisPlan, SheetRequirements, kept_clear, plan_sheets
@@ -17,8 +17,6 @@ from .plan import SheetPlan
 from .profile import RadialProfile
 from .side import covered_points
 from .surface_samples import SurfaceSamples
-
-Floats = NDArray[np.float64]
 
 _MAX_HULL_FACES = 5000  # faces; a convex mesh with more is a smooth body, not a collision hull
 
@@ -89,12 +87,12 @@ class BareTally:
         bare: samples that no reason has taken, shape (n,).
     """
 
-    def __init__(self, hull: SurfaceSamples, covered: NDArray[np.bool_]) -> None:
+    def __init__(self, hull: SurfaceSamples, covered: Bools) -> None:
         self.bare = ~covered
         self._hull = hull
         self._found: list[BareArea] = []
 
-    def take(self, reason: str, chosen: NDArray[np.bool_]) -> None:
+    def take(self, reason: str, chosen: Bools) -> None:
         """Take the bare ones of chosen samples, shape (n,), for a reason; a part too small to report stays bare."""
         mine = self.bare & chosen
         share = float(mine.mean())
@@ -154,7 +152,7 @@ def sheet_more(count: int) -> str:
     return f"a sheet more would cover it: allow {count + 1} sheets with {4 * (count + 1)} wires"
 
 
-def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
+def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> Bools:
     """Return whether sheets cover each sample, shape (n,)."""
     covered = np.zeros(len(hull), bool)
     for about in plans:
@@ -190,7 +188,7 @@ def _further_plans(
     return further, hindered
 
 
-def flat_samples(hull: SurfaceSamples) -> NDArray[np.bool_]:
+def flat_samples(hull: SurfaceSamples) -> Bools:
     """Return whether the hull is flat about each sample, shape (n,)."""
     from scipy.spatial import cKDTree
 
@@ -199,7 +197,7 @@ def flat_samples(hull: SurfaceSamples) -> NDArray[np.bool_]:
     return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
 
 
-def _round(surveys: list[AxisSurvey], hull: SurfaceSamples, tolerance: float) -> NDArray[np.bool_]:
+def _round(surveys: list[AxisSurvey], hull: SurfaceSamples, tolerance: float) -> Bools:
     """Return whether each sample lies on a cone about one of the axes, shape (n,)."""
     on_cone = np.zeros(len(hull), bool)
     for survey in surveys:

@@ -16,8 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.core.errors import MeshError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
@@ -26,8 +26,6 @@ from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import FitOptions
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
-
-Floats = NDArray[np.float64]
 
 _FIT_ROUNDS = 30  # reweighted solutions
 
@@ -129,7 +127,7 @@ def _cone_hypotheses(
     return starts
 
 
-def _partners(samples: SurfaceSamples, rng: np.random.Generator, count: int, others: int) -> list[NDArray[np.int64]]:
+def _partners(samples: SurfaceSamples, rng: np.random.Generator, count: int, others: int) -> list[Ints]:
     """Draw index lists of points that belong together: of each three, one has near partners, one nearer, one any."""
     first = rng.integers(0, len(samples), count)
     chosen = [first]
@@ -189,7 +187,7 @@ def _cones(samples: SurfaceSamples, rng: np.random.Generator) -> tuple[Floats, F
 
 def _explains(
     points: Floats, normals: Floats, origins: Floats, axes: Floats, radii: Floats, angles: Floats, distance: float
-) -> NDArray[np.bool_]:
+) -> Bools:
     """Return whether each point lies on each cone, shape (points, cones)."""
     middle = points.mean(axis=0)  # float32 suffices relative to the middle
     p, o = (points - middle).astype(np.float32), (origins - middle).astype(np.float32)
@@ -312,7 +310,7 @@ class SampledLink:
         return float(self.weights.at(self.hull.points).sum()) * self.hull.area
 
     @property
-    def worth(self) -> NDArray[np.float64] | None:
+    def worth(self) -> Floats | None:
         """What each counted sample counts, shape (n,); None where all count the same."""
         return None if self.weights is None else self.weights.at(self.counted.points)
 

@@ -10,15 +10,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets
 from .candidates import SampledLink
 from .cone_fit import InfiniteCone
 from .profile import AxisFrame, RadialProfile, measure_profile
 from .side import StraightSide
-
-Floats = NDArray[np.float64]
 
 _AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another
 _MAX_ROUNDS = 4  # at one step

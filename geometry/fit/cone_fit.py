@@ -11,11 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .surface_samples import SurfaceSamples
-
-Floats = NDArray[np.float64]
 
 MAX_HALF_ANGLE = math.radians(80.0)  #: rad; a flatter ring is a flange, not a cone
 _MAX_STEPS = 30  # Gauss-Newton steps at the last gate

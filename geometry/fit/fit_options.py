@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError
 
 from .touch_weights import TouchWeights
@@ -95,7 +95,7 @@ class FitOptions:
         return self.max_sheets if self.max_wires is None else min(self.max_sheets, self.max_wires // _SHEET_WIRES)
 
     @property
-    def seam(self) -> NDArray[np.float64]:
+    def seam(self) -> Floats:
         """Unit vector in which the seam of a full wrap faces, shape (3,)."""
         facing = np.asarray(self.seam_direction, float)
         return np.asarray(facing / np.linalg.norm(facing))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
@@ -67,7 +67,7 @@ def fitted_sheet(
     axis: int,
     hull: SurfaceSamples,
     tolerance: float,
-    worth: NDArray[np.float64] | None = None,
+    worth: Floats | None = None,
 ) -> FittedSheet:
     """Return one side of a plan as a sheet on the link.
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from coneskin.core.arrays import Floats
+
 Interval = tuple[int, int]  #: first slice and the one after the last
 
 _ROUNDING_ERROR = 1e-9  # m; so that no interval is given up that is good by rounding

@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coneskin.core.arrays import Floats
 
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, plan_sheets
 from .candidates import SampledLink
@@ -17,8 +18,6 @@ from .coarse_packing import AxisSurvey, Choice, packings, profile_about
 from .cone_fit import InfiniteCone, fit_cone
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, covered_points, facet_offset
-
-Floats = NDArray[np.float64]
 
 
 def refine_axis(profile: RadialProfile, sides: list[StraightSide], tolerance: float, seam: Floats) -> AxisFrame:

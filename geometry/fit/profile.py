@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats
 from coneskin.geometry.displacement_map import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors
 from .touch_weights import TouchWeights
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +98,7 @@ class RadialProfile:
             low = np.where((self.weight > 0.0).all(axis=1), low, 0.0)
         return self.radius.max(axis=1), low
 
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Bools:
         """Return whether a sheet may lie on each cell, shape (k, p)."""
         return np.ones(self.radius.shape, bool) if self.weight is None else self.weight > 0.0
 
@@ -114,7 +112,7 @@ class RadialProfile:
         """Return the profile of which each cell counts what a map says."""
         return replace(self, weight=weights.at(self.points().reshape(-1, 3)).reshape(self.radius.shape))
 
-    def blocked(self, cells: NDArray[np.bool_]) -> RadialProfile:
+    def blocked(self, cells: Bools) -> RadialProfile:
         """Return the profile with cells, shape (k, p), on which no sheet may lie."""
         weight = np.ones(self.radius.shape) if self.weight is None else self.weight
         return replace(self, weight=np.where(cells, 0.0, weight))

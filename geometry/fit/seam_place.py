@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
@@ -21,8 +21,6 @@ from coneskin.geometry.ray_casting import RayCaster
 from .cones import LinkFit
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights, exposure_weights
-
-Floats = NDArray[np.float64]
 
 _AZIMUTH_COUNT = 36
 _ROW_COUNT = 21  # along a sheet; most of what shields a tube stands beyond its ends

@@ -6,16 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.mesh import Mesh
 
 from .cone_fit import InfiniteCone
 from .intervals import least_deviation
 from .profile import RadialProfile
 from .surface_samples import SurfaceSamples
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +52,7 @@ class StraightSide:
         return float(radii @ profile.weight[self.first : self.end][:, cells].sum(axis=1)) * cell
 
 
-def azimuth_columns(profile: RadialProfile, column: int, columns: int) -> NDArray[np.int64]:
+def azimuth_columns(profile: RadialProfile, column: int, columns: int) -> Ints:
     """Return the indices of consecutive azimuths, going round the turn."""
     return (column + np.arange(columns)) % len(profile.phi)
 
@@ -127,7 +125,7 @@ def _median(values: Floats) -> float:
     return float(ordered[middle] if len(ordered) % 2 else 0.5 * (ordered[middle - 1] + ordered[middle]))
 
 
-def longest_run(good: NDArray[np.bool_]) -> tuple[int, int]:
+def longest_run(good: Bools) -> tuple[int, int]:
     """Return the first and the end of the longest run of True, 0 and 0 where there is none."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     if len(edges) == 0:
@@ -168,9 +166,7 @@ def facet_offset(mesh: Mesh, samples: SurfaceSamples, cone: InfiniteCone, tolera
     return mean if spread <= 0.2 * abs(mean) else 0.0
 
 
-def covered_points(
-    profile: RadialProfile, side: StraightSide, hull: SurfaceSamples, tolerance: float
-) -> NDArray[np.bool_]:
+def covered_points(profile: RadialProfile, side: StraightSide, hull: SurfaceSamples, tolerance: float) -> Bools:
     """Return whether a side covers each point of the hull, shape (n,); it covers 1.5 times ``tolerance`` [m]."""
     local = profile.frame.local(hull.points)
     z = local[:, 2]

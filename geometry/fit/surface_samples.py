@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.core.errors import MeshError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,13 +25,13 @@ class SurfaceSamples:
 
     points: Floats
     normals: Floats
-    faces: NDArray[np.int64]
+    faces: Ints
     area: float
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def subset(self, chosen: NDArray[np.bool_]) -> SurfaceSamples:
+    def subset(self, chosen: Bools) -> SurfaceSamples:
         """Return the chosen points; ``chosen`` has the shape (n,)."""
         return SurfaceSamples(self.points[chosen], self.normals[chosen], self.faces[chosen], self.area)
 

@@ -9,17 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coneskin.core.arrays import frozen
+from coneskin.core.arrays import Floats, frozen
 from coneskin.core.errors import GeometryError
 from coneskin.core.files import read_file
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors
 from .surface_samples import SurfaceSamples
-
-Floats = NDArray[np.float64]
 
 LEAST_WEIGHT = 1e-3  #: of the largest; where nothing touches, a sheet may still lie, and it is worth nearly nothing
 _MAP_COLUMNS = ("x_mm", "y_mm", "z_mm", "weight")

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.displacement_map import bridge_holes
@@ -28,8 +28,6 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from .ruling_candidates import RulingCandidate
 from .side_fit import fit_developable
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class RuledRegion:
@@ -41,7 +39,7 @@ class RuledRegion:
     columns: int
 
 
-def columns_of(region: RuledRegion, around: int) -> NDArray[np.int64]:
+def columns_of(region: RuledRegion, around: int) -> Ints:
     """Return the columns of a region on a profile of so many columns, in order."""
     return np.arange(region.column, region.column + region.columns) % around
 
@@ -107,7 +105,7 @@ def _ruled_region(
     return best
 
 
-def _obliquity(radius: Floats, good: NDArray[np.bool_]) -> Floats:
+def _obliquity(radius: Floats, good: Bools) -> Floats:
     """Return by how much a distance along a ray exceeds that square to the surface, for each column, shape (p,)."""
     shown = np.where(good & (radius > 0.0), radius, np.nan)  # a hole that is spanned may have no surface
     around = radius.shape[1]
@@ -122,7 +120,7 @@ def _obliquity(radius: Floats, good: NDArray[np.bool_]) -> Floats:
     return np.asarray(np.minimum(np.hypot(1.0, slope), 2.0))
 
 
-def _longest_run(alive: NDArray[np.bool_]) -> tuple[int, int]:
+def _longest_run(alive: Bools) -> tuple[int, int]:
     """Return the first column and the length of the longest run of a ring."""
     gaps = np.flatnonzero(~alive)
     if len(gaps) == 0:
@@ -142,7 +140,7 @@ class FoundSheet(NamedTuple):
     """A fitted side with what is left of its region after the fit was checked."""
 
     sheet: FittedSheet
-    covers: NDArray[np.bool_]  #: samples of the hull that it covers, shape (n,)
+    covers: Bools  #: samples of the hull that it covers, shape (n,)
 
 
 def ruled_profile(
@@ -185,7 +183,7 @@ def widest_region(profile: RadialProfile, candidate: RulingCandidate, options: F
     return _ruled_region(profile, apex, options.tolerance, rows, least, columns, options.wrap == math.tau)
 
 
-def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: NDArray[np.int64] | None = None) -> Floats:
+def hull_points(profile: RadialProfile, rows: slice = slice(None), columns: Ints | None = None) -> Floats:
     """Return the points of the hull below the cells of a profile, floors of holes filled, shape (n, 3) [m]."""
     chosen = np.arange(len(profile.phi)) if columns is None else columns
     out = np.stack([np.cos(profile.phi[chosen]), np.sin(profile.phi[chosen])], axis=1) @ profile.frame.columns[:, :2].T
@@ -265,7 +263,7 @@ def _rise(mesh: Mesh, placed: Developable, tolerance: float) -> float:
     return mean if mean > 0.0 and spread <= 0.3 * mean else 0.0
 
 
-def _covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
+def _covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: float) -> Bools:
     """Return whether a sheet lies on each sample of the hull, shape (n,)."""
     side = placed.frustum
     u, phi, off = placed.locate_all(hull.points)
@@ -276,7 +274,7 @@ def _covered_samples(placed: PlacedFrustum, hull: SurfaceSamples, distance: floa
     return np.asarray(inside & (np.einsum("ij,ij->i", normals, hull.normals) > _MIN_NORMAL_COSINE))
 
 
-def covered_by(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: float) -> NDArray[np.bool_]:
+def covered_by(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: float) -> Bools:
     """Return whether any of the sheets lies on each sample of the hull, shape (n,)."""
     covered = np.zeros(len(hull), bool)
     for sheet in sheets:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats
 from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
@@ -56,13 +56,11 @@ def _bare_beside(
     return tuple(tally.areas)
 
 
-def _among(hull: SurfaceSamples, area: BareArea) -> NDArray[np.bool_]:
+def _among(hull: SurfaceSamples, area: BareArea) -> Bools:
     """Return whether each sample is one of an area, shape (n,)."""
     inside = set(map(tuple, area.points.tolist()))
     return np.fromiter((tuple(point) in inside for point in hull.points.tolist()), bool, len(hull))
 
-
-Floats = NDArray[np.float64]
 
 _COARSE_GRID = (100, 53)  # slices, and rays in each
 _FINE_GRID = (300, 149)

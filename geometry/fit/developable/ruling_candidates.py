@@ -10,12 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.fit.candidates import AxisCandidate
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
-
-Floats = NDArray[np.float64]
 
 _DRAW_COUNT = 1600  # pairs, and triples, of samples
 _VOTER_COUNT = 1200  # samples that vote
@@ -77,7 +75,7 @@ def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -
 
 
 def _directions(
-    samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, axes: list[AxisCandidate]
+    samples: SurfaceSamples, voters: Ints, rng: np.random.Generator, axes: list[AxisCandidate]
 ) -> list[Floats]:
     """Return the directions to which most tangent planes are parallel, the best first, refined."""
     i, j = rng.integers(0, len(samples), (2, _DRAW_COUNT))
@@ -135,7 +133,7 @@ def _common_point(points: Floats, normals: Floats, size: float, direction: Float
     return np.asarray(middle + size * solution[:3] / solution[3])
 
 
-def _apexes(samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.Generator, size: float) -> list[Floats]:
+def _apexes(samples: SurfaceSamples, voters: Ints, rng: np.random.Generator, size: float) -> list[Floats]:
     """Return the points in which most tangent planes meet, the best first, refined."""
     index = rng.integers(0, len(samples), (_DRAW_COUNT, 3))
     p, n = samples.points[index], samples.normals[index]
@@ -167,7 +165,7 @@ def _apexes(samples: SurfaceSamples, voters: NDArray[np.int64], rng: np.random.G
     return chosen
 
 
-def _votes(samples: SurfaceSamples, voters: NDArray[np.int64], trials: Floats) -> NDArray[np.bool_]:
+def _votes(samples: SurfaceSamples, voters: Ints, trials: Floats) -> Bools:
     p, n = samples.points[voters], samples.normals[voters]
     off = np.einsum("ij,ij->i", n, p)[:, None] - n @ trials.T
     square = (p**2).sum(axis=1)[:, None] - 2.0 * p @ trials.T + (trials**2).sum(axis=1)

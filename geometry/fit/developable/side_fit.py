@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
-
-Floats = NDArray[np.float64]
 
 _STRIPS_PER_TURN = 64  # around a full turn; the section of a stadium of 40 mm is then within 0.03 mm
 _FIT_ROUNDS = 8

@@ -9,6 +9,7 @@ from .errors import GeometryError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Complex = NDArray[np.complex128]
 
 

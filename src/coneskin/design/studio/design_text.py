@@ -21,6 +21,7 @@ from coneskin.geometry.sector import unroll
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from coneskin.core.arrays import Floats, Ints
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.ray_casting import RayCaster
 
@@ -53,8 +54,8 @@ class _DeviationBand(NamedTuple):
     low: float
     high: float
     colour: tuple[int, int, int]
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int64]
+    vertices: Floats
+    faces: Ints
 
 
 def deviation_bands(rays: RayCaster, placed: PlacedFrustum, tolerance: float) -> list[_DeviationBand]:
@@ -109,7 +110,7 @@ class _ElectrodeMark(NamedTuple):
 
     letter: str
     segments: NDArray[np.float32]
-    letters: NDArray[np.float64]
+    letters: Floats
 
 
 def electrode_marks(design: SheetDesign) -> list[_ElectrodeMark]:
@@ -121,7 +122,7 @@ def electrode_marks(design: SheetDesign) -> list[_ElectrodeMark]:
         share = np.linspace(0.0, 1.0, pieces + 1)
         stands = np.array(_LETTER_PLACES[letter])
 
-        def place(at: NDArray[np.float64], above: float, letter: str = letter) -> NDArray[np.float64]:
+        def place(at: Floats, above: float, letter: str = letter) -> Floats:
             u = {"A": box.u2 + half, "B": box.u1 - half}.get(letter, box.u1 + at * (box.u2 - box.u1))
             phi = {"C": box.phi2 + turn, "D": box.phi1 - turn}.get(letter, box.phi1 + at * (box.phi2 - box.phi1))
             points, normals = design.place.place(*np.broadcast_arrays(u, phi + 0.0 * at))

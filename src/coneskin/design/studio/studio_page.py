@@ -35,8 +35,7 @@ from .design_text import (
 from .workbench import Handles, Workbench
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from coneskin.core.arrays import Floats
     from coneskin.design.sheets.sheet_design import SheetDesign
 
 #: for the head of the page: a file that is dropped anywhere goes the way of viser's button, which takes one from its
@@ -77,7 +76,7 @@ _HEIGHT_PREFERENCE = 0.1  # by which another height has to be better
 _VIEW_DISTANCE = 1.55  # of the link's largest side
 
 
-def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArray[np.float64]) -> tuple[Vector, Vector]:
+def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: Floats) -> tuple[Vector, Vector]:
     """Return from where to look, and at what [m]."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, size = 0.5 * (low + high), float((high - low).max())
@@ -92,9 +91,7 @@ def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: NDArra
     return (x, y, z), (at_x, at_y, at_z)
 
 
-def _seen_shares(
-    design: SheetDesign, rays: RayCaster, ways: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _seen_shares(design: SheetDesign, rays: RayCaster, ways: Floats) -> tuple[Floats, Floats]:
     """Return how much of a sheet, and of its two edges along the seam, is seen from far off.
 
     1 is all of it, looked at along its normal; what is seen obliquely counts by the cosine.
@@ -120,7 +117,7 @@ def _seen_shares(
     return seen.mean(axis=0), grid[:, [0, -1]].mean(axis=(0, 1))
 
 
-def _directions() -> NDArray[np.float64]:
+def _directions() -> Floats:
     found = []
     for height in map(math.radians, _VIEW_HEIGHTS):
         for step in range(_AZIMUTH_COUNT):
