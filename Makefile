@@ -63,11 +63,11 @@ $(VENV)/demo.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	touch $@
 
 $(VENV)/test.stamp: $(VENV)/bin/python pyproject.toml setup.py
-	$(BIN)/python -m pip install -q -e '.[pictures,design,test]'
+	$(BIN)/python -m pip install -q -e '.[design,test]'
 	touch $@
 
 $(VENV)/dev.stamp: $(VENV)/test.stamp
-	$(BIN)/python -m pip install -q -e '.[pictures,design,test,dev,docs]'
+	$(BIN)/python -m pip install -q -e '.[design,check,dev,docs]'
 	touch $@
 
 $(VENV)/docs.stamp: $(VENV)/bin/python pyproject.toml setup.py

@@ -13,12 +13,15 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 import coneskin
 from tests.support.paths import COLLISION, ROOT
+
+from .test_docs import PageRun, blocks
 
 pytestmark = pytest.mark.long
 pytest.importorskip("build", reason="needs pip install -e '.[dev]'")
@@ -86,7 +89,18 @@ def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
     expected = {
         f"{name}/{path.relative_to(folder).as_posix()}"
         for name, folder in folders.items()
-        for pattern in ("*.py", "*.pyi", "py.typed", "*.json", "*.csv", "*.ino", "*.h", "*.c", "gallery/*.rec")
+        for pattern in (
+            "*.py",
+            "*.pyi",
+            "py.typed",
+            "*.json",
+            "*.csv",
+            "*.ino",
+            "*.h",
+            "*.c",
+            "*.toml",
+            "gallery/*.rec",
+        )
         for path in folder.rglob(pattern)
     }
     found = {name for name in contents(wheel) if ".dist-info/" not in name}
@@ -127,8 +141,19 @@ def test_the_installed_wheel_runs_without_the_tree(installed: Path, tmp_path: Pa
     assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__} (pure)\n"
     cone = ("--radius1-mm", "40", "--radius2-mm", "70", "--height-mm", "150")
     assert "203.960781 mm" in run(programs / "coneskin", "unroll", *cone, cwd=tmp_path)  # as in demos/01_unroll.py
+    assert "bit by bit" in run(programs / "coneskin", "replay", "gallery:palm", cwd=tmp_path)
     if sys.platform != "win32":  # the demo's virtual skin needs a pseudo-terminal
         assert "bit by bit" in run(programs / "coneskin", "demo", cwd=tmp_path)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere 127.0.0.1 is the only such address")
+@pytest.mark.skipif(find_spec("rtde_control") is None, reason="the ur_rtde wheel is not installed")
+def test_readmes_first_program_runs_from_the_wheel_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
+    program = next(block for block in blocks(ROOT / "README.md") if block.language == "python")
+    (tmp_path / "program.py").write_text(PageRun(tmp_path).adapt(program.text), encoding="utf-8")
+    said = run(installed / "python", "program.py", cwd=tmp_path)
+    assert "on the forearm was touched at u = 130" in said
+    assert "same decisions, bit by bit: True" in said
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere 127.0.0.1 is the only such address")

@@ -23,7 +23,7 @@ def load_pinocchio() -> Any:
     try:
         import pinocchio
     except ImportError as exc:
-        raise MissingExtra("pin", "independent kinematics", "test") from exc
+        raise MissingExtra("pin", "independent kinematics", "check") from exc
     return pinocchio
 
 

@@ -32,6 +32,7 @@ def posed_arms(draw):
 
 @given(posed_arms(), st.tuples(lengths, lengths, lengths), st.data())
 def test_points_and_jacobians_are_those_of_pinocchio(posed, point, data):
+    pytest.importorskip("pinocchio", reason="the independent kinematics are pinocchio's (PyPI: pin)")
     arm, q = posed
     link = data.draw(st.integers(1, arm.joints))
     placed = place_point(arm, q, link, point)
