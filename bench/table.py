@@ -84,6 +84,7 @@ BENCHES = {
     "board-spice": Bench(
         "bench.firmware.board_spice", "Stray inductance, radio, and parts that are not as their data sheets."
     ),
+    "boards": Bench("bench.firmware.boards", "Parts that are not as their data sheets, radio, and discharges."),
     "firmware-guard": Bench("bench.firmware.guard", _SIMULATED_ARM + " The board is emulated."),
     # sheets for links
     "design-map": Bench("bench.design.map", "Links of other shapes."),

@@ -69,6 +69,7 @@ class Cause(Enum):
     SEQUENCE_STEPS = "count the sequence up by one for each frame of the sensor; or frames are lost on the way"
     SEQUENCE_RANDOM = "the sequence is a number of its own that counts frames: see that nothing else is written there"
     FRAMES_LOST = "check baud rate and cable, send fewer frames a second, and see what keeps the computer busy"
+    UNCOUNTED = "count a frame in the sequence also when it is not sent, and measure in even steps"
     REPEATED = "send each measurement once: sequence and clock of a frame must be new"
     CLOCK_STANDS = "put the device's time [us] into the clock of each frame"
     CLOCK_MILLISECONDS = "the clock counts microseconds: use micros(), not millis()"

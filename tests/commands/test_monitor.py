@@ -7,12 +7,15 @@ import threading
 import time
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from coneskin.cli import main
+from coneskin.commands import monitor
 from coneskin.commissioning.line.line_monitor import LineMonitor
 from coneskin.core.errors import SkinTimeout
+from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.sources.serial_port import SerialPort
 
 from ..scene.scenes import SKIN_ONLY, record
@@ -43,6 +46,37 @@ def test_bytes_of_a_file_have_no_rate(tmp_path: Path, capsys: pytest.CaptureFixt
         (tmp_path / name).write_bytes(data)
         assert main(["monitor", str(tmp_path / name)]) == 1
         assert capsys.readouterr().out.startswith(said)
+
+
+@pytest.mark.pure
+def test_a_computer_that_was_held_up_has_not_heard_that_the_device_stopped(
+    program: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = [100.0]
+    pieces = [data for _, data in bytes_of(program, "none", 1.6)]
+
+    class Held:
+        """A port whose reader stands still for 2 s just after it has waited in vain."""
+
+        def __enter__(self) -> "Held":
+            return self
+
+        def __exit__(self, *_: object) -> None: ...
+
+        def read(self, timeout: float) -> bytes:
+            if pieces:
+                clock[0] += 1e-3
+                return pieces.pop(0)
+            clock[0] += timeout + 2.0
+            raise SkinTimeout("nothing came")
+
+    monkeypatch.setattr(monitor.time, "monotonic", lambda: clock[0])
+    line = SimpleNamespace(source=Held(), sensors=(), baud=None)
+    args = SimpleNamespace(json=True, duration_s=1.7, hex=False)
+    shown: list[str] = []
+    monitor._listen(line, args, lambda report: shown.append(report.diagnosis.item))  # type: ignore[arg-type]
+    assert len(shown) >= 2
+    assert Cause.STOPPED.key not in shown
 
 
 def test_a_recording_is_diagnosed_with_the_times_that_it_has(
@@ -83,14 +117,14 @@ def test_every_mistake_is_named_on_a_port(program: Path) -> None:
         assert sender.stdout is not None
         try:
             with SerialPort(sender.stdout.readline().strip(), BAUD) as port:
-                monitor = LineMonitor(start := time.monotonic(), (), BAUD)
+                listener = LineMonitor(start := time.monotonic(), (), BAUD)
                 look_at = start + FIRST_LOOK
                 while (now := time.monotonic()) < start + DEADLINE:
                     with suppress(SkinTimeout):
-                        monitor.feed(port.read(max(look_at - now, 0.0)), time.monotonic())
+                        listener.feed(port.read(max(look_at - now, 0.0)), time.monotonic())
                     if now >= look_at:
                         look_at = now + 1.0
-                        named = monitor.report(now).diagnosis
+                        named = listener.report(now).diagnosis
                         if named.item == {**MISTAKES, **NOT_TO_BE_NAMED}[name].key:
                             wrong.pop(name, None)
                             return

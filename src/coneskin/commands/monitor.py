@@ -123,19 +123,22 @@ def _listen(line: Line, args: argparse.Namespace, show: Callable[[LineReport], N
         start = time.monotonic()
         monitor = LineMonitor(start, line.sensors, line.baud)
         due, end = start + min(_FIRST_PERIOD, args.duration_s), start + args.duration_s
+        heard = start
         try:
             while (now := time.monotonic()) < end:
+                wait = max(0.001, min(_READ_TIMEOUT, due - now))
+                heard = now + wait  # a computer that is held up longer has not heard that nothing came
                 with suppress(SkinTimeout):
-                    data = source.read(max(0.001, min(_READ_TIMEOUT, due - now)))
-                    monitor.feed(data, time.monotonic())
+                    data = source.read(wait)
+                    monitor.feed(data, heard := time.monotonic())
                 if (now := time.monotonic()) >= due:
-                    show(monitor.report(now))
+                    show(monitor.report(min(heard, now)))
                     due = max(due + period, now)
         except KeyboardInterrupt:
             pass  # the way to end it
         except SkinConnectionError as error:
             gone = str(error)
-        report = monitor.report(time.monotonic())
+        report = monitor.report(min(heard, time.monotonic()))
     show(report)
     if not args.json:
         print(_summary(report), file=sys.stderr)

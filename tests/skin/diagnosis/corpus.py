@@ -97,6 +97,8 @@ MISTAKES = {
     "sequence shared": Cause.SEQUENCE_SHARED,
     "sequence is the clock": Cause.SEQUENCE_STEPS,
     "every frame twice": Cause.REPEATED,
+    "every fiftieth frame twice": Cause.REPEATED,
+    "every twentieth frame is dropped uncounted": Cause.UNCOUNTED,
     "every fourth frame is lost": Cause.FRAMES_LOST,
     "restarted in every frame": Cause.RESTARTED_ALWAYS,
     "watchdog bites": Cause.RESTARTS,

@@ -349,13 +349,16 @@ int main(int argc, char **argv) {
         if (foreign) { other_device(when, number); continue; }
         if (is("hangs after a while") && when > 0.4) break;
         for (uint32_t sensor = 0; sensor < sensors; sensor++) {
-            size_t length = write_frame(frame, number, when, (uint8_t)sensor, sensors);
+            const int silent = is("every twentieth frame is dropped uncounted");
+            size_t length = write_frame(frame, silent ? number - number / 20 : number, when, (uint8_t)sensor, sensors);
             if (is("every frame twice")) { send_frame(when, frame, length, number); send_frame(when, frame, length, number); }
             else if (is("held back for 16 ms")) {
                 memcpy(bundle + held, frame, length); held += length;
                 if (number % 16 == 15) { emit(when, bundle, held); held = 0; }
             }
+            else if (is("every fiftieth frame twice") && number % 50 == 1) { send_frame(when, frame, length, number); send_frame(when, frame, length, number); }
             else if (is("every fourth frame is lost") && number % 4 == 1) {}
+            else if (silent && number % 20 == 19) {}
             else send_frame(when, frame, length, number);
         }
     }
