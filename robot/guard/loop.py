@@ -126,7 +126,7 @@ class _Outbox:
 
 
 _HEARTBEAT_BYTES = Heartbeat().encode()
-_SESSION_GONE_TIMEOUT = 1.5  # s that the arm has to stand when there is nobody left to tell
+_SESSION_GONE_TIMEOUT = 0.8  # s that the arm has to stand when there is nobody left to tell; then watchdogs take over
 #: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
 _PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
 _LATE_TIME = 2.0 * BEAT_PERIOD  # s without a heartbeat, from which on it is asked why

@@ -83,7 +83,7 @@ class StandstillHold:
             self._deceleration = deceleration
         self._stop.send(StopProgram(self._deceleration), self)
         self._began = self._due = now = self._clock()
-        speed = None if self._state is None or self._states_missing() else self._state.speed
+        speed = None if self._state is None or self.states_missing() else self._state.speed
         self._stop.begin(now, speed, self._deceleration)
         self.stopping, self.stands = True, False
 
@@ -108,14 +108,14 @@ class StandstillHold:
             return self._continue(states, now)
         watch = self._stop.watch
         moved = sum(watch.moved(state, True) for state, _ in states) > 0  # every state has to be taken
-        if self._began is not None and self._states_missing():
+        if self._began is not None and self.states_missing():
             self.stands = False
             if now >= self._due:
                 self._reconnect()
                 for path in (StopPath.PROGRAM, StopPath.COMMAND):
                     self._use(path)
                 self._due = self._clock() + _REPEAT_PERIOD
-                self.failed = self.failed or self._states_missing(_BLIND_TIMEOUT)
+                self.failed = self.failed or self.states_missing(_BLIND_TIMEOUT)
             return False
         if moved or not watch.under_way:
             self.begin()
@@ -152,7 +152,7 @@ class StandstillHold:
         self._stop.escalate(self._clock(), self)
         return False
 
-    def _states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
+    def states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
         """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
         return self._age.silent(self._clock(), max(2.0 * self._limits.arm_silence, at_least))
 

@@ -36,6 +36,7 @@ from .limits import MonitoringLimits
 _POLL_PERIOD = 0.01  # s between two looks
 _STOP_POLL_PERIOD = 0.002  # s; while a stop is under way
 _CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
+_ORPHAN_TIME = 1.0  # s without program, guard and states, from which on stops reach nobody: none stays for 2 s
 
 
 class _GuardWatchdog:
@@ -62,7 +63,7 @@ class _GuardWatchdog:
         self._hold = hold
         self._patience = UNGUARDED_TIME if second else GUARD_SILENCE
         self._sign = StatusReport("alive", "second" if second else "").encode()
-        self._left = False  # the guarded program
+        self._left_at = math.inf  # when the guarded program left [s]
         self._ended = False  # the guard, in order
         self._asked: StopProgram | None = None  # a stop that waits for the one under way
         self._clock = clock
@@ -83,7 +84,8 @@ class _GuardWatchdog:
         wait_readable(inputs, timeout)
         now, hold = self._clock(), self._hold
         self._beat(now)
-        self._left = self._left or LEAVE in self._session.receive() or self._session.closed
+        if LEAVE in self._session.receive() or self._session.closed:
+            self._left_at = min(self._left_at, now)
         for message in self._guard.receive():
             self._heard, self._alone = now, False
             match decode_command(message):
@@ -110,7 +112,9 @@ class _GuardWatchdog:
             what = f"the guard was silent for {self._patience:g} s, the arm was stopped"
             self._guard.send(StatusReport("error", what).encode())
             hold.begin()
-        return hold.stopping or not (gone and self._left and (hold.stands or hold.failed))
+        if gone and now - self._left_at > _ORPHAN_TIME and hold.states_missing():
+            return False
+        return hold.stopping or not (gone and self._left_at < math.inf and (hold.stands or hold.failed))
 
     def _beat(self, now: float) -> None:
         """Send a heartbeat where one is due at a time [s]."""
