@@ -158,8 +158,12 @@ class GuardCore:
                 "in the one that was there"
             )
         for detector in self._stream.detectors:
-            name, fault = detector.sensor.name, detector.fault
-            if detector.age(now) > self._limits.skin_silence:
+            name, fault, age = detector.sensor.name, detector.fault, detector.age(now)
+            if age == math.inf:
+                blockers.append(
+                    f"{name}: waits for its first valid frame; if none comes, check power and cable"
+                )
+            elif age > self._limits.skin_silence:
                 blockers.append(f"{name}: no valid frame" + (f" ({fault.value})" if fault else ""))
             elif detector.touched:
                 blockers.append(f"{name}: it is touched, or its layers are stuck together")

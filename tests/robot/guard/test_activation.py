@@ -30,7 +30,7 @@ def test_nothing_moves_before_everything_is_sound():
         (lambda rig: setattr(rig.arm, "robot_mode", 5), "not powered, or its brakes"),
         (lambda rig: rig.arm.q.__setitem__(2, 3.5), "joint 3 must be within -3.142 to 3.142 rad, it is at 3.500 rad"),
         (lambda rig: setattr(rig, "mute_arm", True), "the controller is silent"),
-        (lambda rig: setattr(rig, "mute_skin", True), "one: no valid frame"),
+        (lambda rig: setattr(rig, "mute_skin", True), "one: waits for its first valid frame; if none comes"),
     ],
 )
 def test_it_refuses_to_arm_and_says_why(spoil, reason):
