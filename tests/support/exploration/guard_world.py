@@ -312,7 +312,9 @@ class GuardWorld:
         more = wrong.count() < self.settings.most_wrong
         if phase is Phase.ACTIVE or self.settings.control == "external":
             found.append("a program moves")
-        if self.settings.control == "external" and self.arm.runtime_state == 2:
+        arm = self.core._arm
+        halted = arm is not None and arm.speed_reduction.halted  # then a person ends the driver's own program, too
+        if (self.settings.control == "external" or halted) and self.arm.runtime_state == 2:
             found.append("the program ends")
         if phase is not Phase.STARTING:
             found += ["reset", "reset another stop"]
@@ -555,6 +557,8 @@ class GuardWorld:
             self.companions.feed(output)
             if isinstance(output, Release):
                 self._judge.released = output.number
+                if self.settings.control == "internal":
+                    self.arm.runtime_state = 2  # the driver process starts its program again where it has ended
             elif not isinstance(output, GuardEvent):
                 self.arm.feed(output)
         return out

@@ -8,7 +8,7 @@ hold the bodies; a person moves their rest, to push back or to grip.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -296,7 +296,7 @@ class MujocoPlant:
         return row
 
     def _press(self, near: Sequence[tuple[Touch, Floats]], depths: list[float]) -> None:
-        """Put the forces of the contacts on skins and bodies, and let people act; the depths grow with the speeds."""
+        """Put the contacts' forces on skins and bodies, and let people act by what they feel; depths grow with speeds."""
         d, step = self._d, self._step
         applied, velocity = d.qfrc_applied, d.qvel
         applied[:] = 0.0
@@ -317,16 +317,8 @@ class MujocoPlant:
         for number, at in self._moving if self._period == 1 else ():
             x, y, z = velocity[at : at + 3].tolist()
             self.lost += self._damping[number] * (x * x + y * y + z * z) * step
-        self._let_people_act(felt)
-
-    def _let_people_act(self, felt: Mapping[int, Sequence[tuple[float, Floats]]]) -> None:
-        """Let people move what holds the bodies, for one step, by what touches each part."""
         for number, at in self._moving:
-            part = self.parts[number]
-            if not part.acts:
-                continue
-            began = self._touched.get(self._body_numbers[number])
-            since = -1.0 if began is None else self.time - began
+            part, since = self.parts[number], self.time - self._touched.get(self._body_numbers[number], math.inf)
             if part.update(since, felt.get(number, ()), self._step):
                 self._m.qpos_spring[at : at + 3] = part.rest
 
