@@ -296,7 +296,7 @@ class MujocoPlant:
         return row
 
     def _press(self, near: Sequence[tuple[Touch, Floats]], depths: list[float]) -> None:
-        """Put the contacts' forces on skins and bodies, and let people act by what they feel; depths grow with speeds."""
+        """Put the forces of contacts on skins and bodies, and let people act; the depths grow with the speeds."""
         d, step = self._d, self._step
         applied, velocity = d.qfrc_applied, d.qvel
         applied[:] = 0.0
