@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from coneskin.core.arrays import Bools, Floats
 
 from .intervals import balance_borders, choose_intervals, longest_intervals
-from .profile import RadialProfile
-from .side import StraightSide, azimuth_columns, fit_side
+from .profile import RadialProfile, Region
+from .side import StraightSide, fit_side
 from .touch_weights import TouchWeights
-
-Region = tuple[int, int, int, int]  #: first row, end row, first column, columns
 
 
 def _largest_region(
@@ -36,8 +34,7 @@ def _largest_region(
         worth: what each cell counts, not negative, shape (k, p); 1 by default.
 
     Returns:
-        first row, row after the last, first column (in [0, p)) and number of columns (p for a full turn); None
-        where no rectangle is large enough.
+        the region, its first column in [0, p), with p columns for a full turn; None where none is large enough.
     """
     count, around = good.shape
     if columns > around or rows > count:
@@ -62,7 +59,7 @@ def _largest_region(
         found = _largest(runs, rows, columns, most)
     else:
         found = _worthiest(runs, rows, columns, most, worth[lowest:end])
-    return found and (found[0] + lowest, found[1] + lowest, *found[2:])
+    return found and found._replace(first=found.first + lowest, end=found.end + lowest)
 
 
 def _largest(runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, most: int) -> Region | None:
@@ -91,7 +88,7 @@ def _largest(runs: Callable[[int], NDArray[np.int32]], rows: int, columns: int, 
                 beyond, step = middle, most
         if tall * wide > area:
             _, end, first = tallest[wide]
-            area, best = tall * wide, (end + 1 - tall, end + 1, first, wide)
+            area, best = tall * wide, Region(end + 1 - tall, end + 1, first, wide)
         wide = max(wide, area // max(tall - 1, 1)) + 1
     return best
 
@@ -115,7 +112,7 @@ def _worthiest(
         at = int(values.argmax())
         if values.flat[at] > area:
             end, first = divmod(at, around)
-            area, best = float(values.flat[at]), (end + 1 - int(run.flat[at]), end + 1, first, wide)
+            area, best = float(values.flat[at]), Region(end + 1 - int(run.flat[at]), end + 1, first, wide)
     return best
 
 
@@ -275,7 +272,7 @@ def _neighbourhood(profile: RadialProfile, side: StraightSide, gap: float) -> Bo
     around = len(profile.phi)
     least = float(side.radii(profile.z[side.first : side.end]).min())
     wide = min(math.ceil(gap / (math.tau / around * max(least, 1e-3))), around)
-    columns = azimuth_columns(profile, side.column - wide, min(side.columns + 2 * wide, around))
+    columns = profile.azimuths(side.column - wide, min(side.columns + 2 * wide, around))
     cells[np.ix_(np.arange(max(0, side.first - rows), min(len(profile.z), side.end + rows)), columns)] = True
     return cells
 

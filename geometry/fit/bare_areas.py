@@ -53,8 +53,6 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
     return f"{found} lost the tubes; {asked}"
 
 
-_NEIGHBOR_COUNT = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
-_FLAT_COSINE = math.cos(math.radians(2.0))
 _ROUND_COSINE = 0.985
 _STRAIGHT_SINE = 0.06
 _LEAST_LENGTH = 0.010  # m; a cone touches a dome of 40 mm over less
@@ -100,6 +98,10 @@ class BareTally:
             self._found.append(BareArea(reason, share, self._hull.points[mine]))
             self.bare[mine] = False
 
+    def take_more(self, count: int, covered: Bools) -> None:
+        """Take what a sheet beside ``count`` others would cover, shape (n,)."""
+        self.take(f"a sheet more would cover it: allow {count + 1} sheets with {4 * (count + 1)} wires", covered)
+
     @property
     def areas(self) -> list[BareArea]:
         """What was taken, the largest area first."""
@@ -125,7 +127,7 @@ def bare_areas(
     tally = BareTally(hull, _covered(plan.axes, hull, requirements.tolerance))
     take = tally.take
     if more is not None:
-        take(sheet_more(plan.count), _covered([more], hull, requirements.tolerance))
+        tally.take_more(plan.count, _covered([more], hull, requirements.tolerance))
     further, hindered = _further_plans(plan, surveys, requirements)
     if further is not None and further.area < requirements.least_gain:
         little = "is too small" if requirements.weights is None else "covers too little that counts"
@@ -138,18 +140,13 @@ def bare_areas(
             "a sheet here would run into another one or reach too far around it",
             _covered([hindered], hull, requirements.tolerance),
         )
-    take("flat", flat_samples(hull))
+    take("flat", hull.flat())
     least = f"{requirements.min_length * 1e3:g} mm long and {math.degrees(requirements.min_wrap):g} deg wide"
     left = np.zeros(len(hull), bool)
     left[tally.bare] = _round(surveys, hull.subset(tally.bare), requirements.tolerance)
     take(f"round, but without room for a sheet {least}", left)
     take("curved in two ways, or in a corner", np.ones(len(hull), bool))
     return tally.areas
-
-
-def sheet_more(count: int) -> str:
-    """Return the reason why an area is bare that a sheet beside ``count`` others would cover."""
-    return f"a sheet more would cover it: allow {count + 1} sheets with {4 * (count + 1)} wires"
 
 
 def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> Bools:
@@ -186,15 +183,6 @@ def _further_plans(
         further = larger(kept_clear(survey.profile, axes, requirements), survey, further)
         hindered = larger(kept_clear(survey.profile, axes, taken), survey, hindered)
     return further, hindered
-
-
-def flat_samples(hull: SurfaceSamples) -> Bools:
-    """Return whether the hull is flat about each sample, shape (n,)."""
-    from scipy.spatial import cKDTree
-
-    near = cKDTree(hull.points).query(hull.points, min(_NEIGHBOR_COUNT, len(hull)))[1]
-    cosines = np.einsum("ijk,ik->ij", hull.normals[near], hull.normals)
-    return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
 
 
 def _round(surveys: list[AxisSurvey], hull: SurfaceSamples, tolerance: float) -> Bools:

@@ -24,6 +24,7 @@ from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import FitOptions
+from .profile import AxisFrame, RadialProfile, measure_profile
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
 
@@ -313,6 +314,21 @@ class SampledLink:
     def worth(self) -> Floats | None:
         """What each counted sample counts, shape (n,); None where all count the same."""
         return None if self.weights is None else self.weights.at(self.counted.points)
+
+    def profile(
+        self, frame: AxisFrame, grid: tuple[int, int], max_bridge: float, weighed: bool = True
+    ) -> RadialProfile:
+        """Measure a profile about an axis, of at most so many slices and so many rays in each.
+
+        Args:
+            frame: the axis.
+            grid: slices, and rays in each.
+            max_bridge: width of the widest hole that a sheet spans [m].
+            weighed: by what areas count.
+        """
+        step = max(float(np.ptp(self.mesh.outermost @ frame.axis)) / grid[0], 0.0005)
+        profile = measure_profile(self.mesh, self.rays, frame, step, grid[1], max_bridge)
+        return profile.weighed(self.weights) if weighed and self.weights else profile
 
 
 def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]) -> SampledLink:

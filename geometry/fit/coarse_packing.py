@@ -16,7 +16,7 @@ from coneskin.core.arrays import Floats
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets
 from .candidates import SampledLink
 from .cone_fit import InfiniteCone
-from .profile import AxisFrame, RadialProfile, measure_profile
+from .profile import AxisFrame, RadialProfile
 from .side import StraightSide
 
 _AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another
@@ -128,7 +128,7 @@ def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[Axis
     surveys = []
     for candidate in link.axes:
         frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)
-        profile = profile_about(link, frame, _COARSE_GRID, requirements)
+        profile = link.profile(frame, _COARSE_GRID, requirements.max_bridge)
         surveys.append(AxisSurvey(profile, _side_lines(profile, candidate.cones)))
     return surveys
 
@@ -183,7 +183,7 @@ def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: S
         (side,) = plan.sides
         better = _search_axis(one.profile, side, one.lines, requirements)
         if better is not None:
-            profile = profile_about(link, better, _COARSE_GRID, requirements)
+            profile = link.profile(better, _COARSE_GRID, requirements.max_bridge)
             moved = float((better.origin - frame.origin) @ frame.axis)
             cone = InfiniteCone(better.origin, better.axis, side.radius + side.slope * moved, math.atan(side.slope))
             found.append(AxisSurvey(profile, _side_lines(profile, (cone,))))
@@ -252,12 +252,3 @@ def grown(
             break
         packing = [*packing, best]
     return packing
-
-
-def profile_about(
-    link: SampledLink, frame: AxisFrame, grid: tuple[int, int], requirements: SheetRequirements
-) -> RadialProfile:
-    """Measure a profile about an axis, of at most so many slices and so many rays in each."""
-    step = max(float(np.ptp(link.mesh.outermost @ frame.axis)) / grid[0], 0.0005)
-    profile = measure_profile(link.mesh, link.rays, frame, step, grid[1], requirements.max_bridge)
-    return profile if requirements.weights is None else profile.weighed(requirements.weights)

@@ -14,7 +14,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 
 from .axis_plan import AxisPlan
-from .side import StraightSide, azimuth_columns, covered_points
+from .side import StraightSide, covered_points
 from .surface_samples import SurfaceSamples
 
 
@@ -90,7 +90,7 @@ def fitted_sheet(
     base = frame.origin + start * frame.axis
     rows = [(float(a), float(b), float(c)) for a, b, c in frame.columns @ spin]
     pose = Pose((rows[0], rows[1], rows[2]), (float(base[0]), float(base[1]), float(base[2])))
-    cells = azimuth_columns(profile, side.column, side.columns)
+    cells = profile.azimuths(side.column, side.columns)
     cosine = 1.0 / math.hypot(1.0, side.slope)
     line = side.radii(profile.z[side.first : side.end])[:, None]
     radius = profile.radius[side.first : side.end][:, cells]

@@ -14,7 +14,7 @@ from coneskin.core.arrays import Floats
 
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, plan_sheets
 from .candidates import SampledLink
-from .coarse_packing import AxisSurvey, Choice, packings, profile_about
+from .coarse_packing import AxisSurvey, Choice, packings
 from .cone_fit import InfiniteCone, fit_cone
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, covered_points, facet_offset
@@ -200,7 +200,7 @@ class FineStage:
         """Return the sheets about one axis on a fine profile, clear of those that are there."""
         wanted = self.requirements
         lines = [(side.radius, side.slope) for side in choice.plan.sides]
-        profile = profile_about(self.link, choice.plan.profile.frame, _FINE_GRID, wanted)
+        profile = self.link.profile(choice.plan.profile.frame, _FINE_GRID, wanted.max_bridge)
         plan = _fullest(kept_clear(profile, done, wanted), lines, wanted, choice.kinds)
         return plan and _refined(self.link, plan, wanted, done, choice.kinds)
 
@@ -251,6 +251,6 @@ def _refined(
             near = replace(near, radius=side.radius + side.slope * away)
         rises.append(facet_offset(link.mesh, below, near, requirements.tolerance))
         areas.append(side.area(plan.profile))
-    profile = kept_clear(profile_about(link, frame, grid, requirements), others, requirements)
+    profile = kept_clear(link.profile(frame, grid, requirements.max_bridge), others, requirements)
     again = _fullest(profile, lines, requirements, kinds, float(np.average(rises, weights=areas)))
     return again if again is not None and again.area > 0.99 * plan.area else plan

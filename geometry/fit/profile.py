@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from coneskin.core.arrays import Bools, Floats
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.displacement_map import bridge_holes
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
@@ -56,6 +57,15 @@ class AxisFrame:
         return float(z.min()), float(z.max()), math.sqrt(float((x * x + y * y).max()))
 
 
+class Region(NamedTuple):
+    """Cells of a profile: rows from ``first`` to before ``end``, and ``columns`` columns from ``column`` on."""
+
+    first: int
+    end: int
+    column: int
+    columns: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class RadialProfile:
     """Radius of the hull on a grid of heights and azimuths.
@@ -102,11 +112,23 @@ class RadialProfile:
         """Return whether a sheet may lie on each cell, shape (k, p)."""
         return np.ones(self.radius.shape, bool) if self.weight is None else self.weight > 0.0
 
-    def points(self) -> Floats:
-        """Return the places of the cells on the hull [m], shape (k, p, 3)."""
-        out = self.frame.columns[:, :2] @ np.stack([np.cos(self.phi), np.sin(self.phi)])
-        along = self.frame.origin + self.z[:, None] * self.frame.axis
-        return np.asarray(along[:, None] + self.radius[..., None] * out.T)
+    def azimuths(self, column: int, columns: int) -> Ints:
+        """Return the indices of consecutive azimuths, going round the turn."""
+        return (column + np.arange(columns)) % len(self.phi)
+
+    def points(self, bridged: bool = False, rows: slice | Ints = slice(None), columns: Ints | None = None) -> Floats:
+        """Return the places of cells on the hull [m], shape (k, p, 3), of all by default.
+
+        Args:
+            bridged: True for the floors of holes that are filled.
+            rows: slices.
+            columns: azimuths.
+        """
+        chosen = np.arange(len(self.phi)) if columns is None else columns
+        out = np.stack([np.cos(self.phi[chosen]), np.sin(self.phi[chosen])], axis=1) @ self.frame.columns[:, :2].T
+        radius = (self.bridged if bridged else self.radius)[rows][:, chosen]
+        along = self.frame.origin + self.z[rows][:, None] * self.frame.axis
+        return np.asarray(along[:, None] + radius[..., None] * out)
 
     def weighed(self, weights: TouchWeights) -> RadialProfile:
         """Return the profile of which each cell counts what a map says."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coneskin.core.arrays import Bools, Floats, Ints
+from coneskin.core.arrays import Bools, Floats
 from coneskin.geometry.mesh import Mesh
 
 from .cone_fit import InfiniteCone
@@ -48,13 +48,8 @@ class StraightSide:
         cell = profile.step * 2.0 * math.pi / len(profile.phi) * math.hypot(1.0, self.slope)
         if profile.weight is None:
             return float(radii.sum()) * self.columns * cell
-        cells = azimuth_columns(profile, self.column, self.columns)
+        cells = profile.azimuths(self.column, self.columns)
         return float(radii @ profile.weight[self.first : self.end][:, cells].sum(axis=1)) * cell
-
-
-def azimuth_columns(profile: RadialProfile, column: int, columns: int) -> Ints:
-    """Return the indices of consecutive azimuths, going round the turn."""
-    return (column + np.arange(columns)) % len(profile.phi)
 
 
 def fit_side(
@@ -75,7 +70,7 @@ def fit_side(
         tolerance: largest distance from the side [m].
         offset: added to the radius of the mean line, because facets lie inside the true surface [m].
     """
-    across = azimuth_columns(profile, column, columns)
+    across = profile.azimuths(column, columns)
     z = profile.z[first:end]
     radius = profile.radius[first:end][:, across]
     high, low = radius.max(axis=1), profile.floor(tolerance)[first:end][:, across].min(axis=1)

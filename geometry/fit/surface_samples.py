@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,12 @@ import numpy as np
 from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.core.errors import MeshError
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
+
+_MIN_NORMAL_COSINE = 0.9  # cosine between the normals of the hull and of a sheet on it
+_NEIGHBOR_COUNT = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
+_FLAT_COSINE = math.cos(math.radians(2.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,6 +40,24 @@ class SurfaceSamples:
     def subset(self, chosen: Bools) -> SurfaceSamples:
         """Return the chosen points; ``chosen`` has the shape (n,)."""
         return SurfaceSamples(self.points[chosen], self.normals[chosen], self.faces[chosen], self.area)
+
+    def below(self, placed: PlacedFrustum, distance: float) -> Bools:
+        """Return whether a side lies on each sample, at most a distance [m] from it, shape (n,)."""
+        side = placed.frustum
+        u, phi, off = placed.locate_all(self.points)
+        inside = (np.abs(off) <= distance) & (u >= 0.0) & (u <= side.slant)
+        if side.wrap < math.tau - 1e-9:
+            inside &= (phi >= 0.0) & (phi <= side.wrap)
+        normals = placed.place(np.zeros(len(phi)), phi)[1]
+        return np.asarray(inside & (np.einsum("ij,ij->i", normals, self.normals) > _MIN_NORMAL_COSINE))
+
+    def flat(self) -> Bools:
+        """Return whether the hull is flat about each sample, shape (n,)."""
+        from scipy.spatial import cKDTree
+
+        near = cKDTree(self.points).query(self.points, min(_NEIGHBOR_COUNT, len(self)))[1]
+        cosines = np.einsum("ijk,ik->ij", self.normals[near], self.normals)
+        return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
 
 
 def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000, seed: int = 1) -> SurfaceSamples:

@@ -1,36 +1,34 @@
-"""Packing of developable sheets on a link: general cylinders and cones, where those of round section cover less."""
+"""Packing of developable sheets on a link: general cylinders and cones, where those of round section cover less.
+
+A sheet lies on the largest region of a profile whose columns run straight along rulings, whatever its section is. Its
+side is fitted to the hull there, and cut to what is within the tolerance.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from coneskin.core.arrays import Bools, Floats
-from coneskin.geometry.fit.bare_areas import BareArea, BareTally, flat_samples, hull_note, sheet_more
+from coneskin.core.errors import GeometryError
+from coneskin.geometry.developable import Developable
+from coneskin.geometry.fit.bare_areas import BareArea, BareTally, hull_note
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.fit_options import FitOptions, check_names
 from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.fit.profile import RadialProfile
+from coneskin.geometry.fit.profile import RadialProfile, Region
+from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-from .found_sheet import (
-    FoundSheet,
-    RuledRegion,
-    columns_of,
-    covered_by,
-    fit_sheet,
-    hull_points,
-    ruled_profile,
-    widest_region,
-)
 from .ruling_candidates import RulingCandidate, find_ruling_candidates
+from .side_fit import fit_developable
 
 
 def _bare_beside(
@@ -44,16 +42,24 @@ def _bare_beside(
 
     ``more`` could be added if one more were allowed; the reasons of ``earlier``, found before the last sheets, hold.
     """
-    tally = BareTally(hull, covered_by(sheets, hull, options.tolerance))
+    tally = BareTally(hull, _covered(sheets, hull, options.tolerance))
     take = tally.take
     if more:
-        take(sheet_more(len(sheets)), covered_by(more, hull, options.tolerance))
+        tally.take_more(len(sheets), _covered(more, hull, options.tolerance))
     for area in earlier:
         take(area.reason, _among(hull, area))
-    take("flat", flat_samples(hull))
+    take("flat", hull.flat())
     least = f"{options.min_length * 1e3:g} mm long and {math.degrees(options.min_wrap):g} deg wide"
     take(f"curved in two ways, in a corner, or without room for a sheet {least}", np.ones(len(hull), bool))
     return tuple(tally.areas)
+
+
+def _covered(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: float) -> Bools:
+    """Return whether any of the sheets lies on each sample of the hull, shape (n,)."""
+    covered = np.zeros(len(hull), bool)
+    for sheet in sheets:
+        covered |= hull.below(sheet.placed, distance)
+    return covered
 
 
 def _among(hull: SurfaceSamples, area: BareArea) -> Bools:
@@ -88,11 +94,11 @@ def with_developables(
     most, tolerance = options.most_sheets, options.tolerance
     say("looking for rulings")
     worth = np.ones(len(link.counted)) if link.worth is None else link.worth
-    taken = covered_by(cones.sheets, link.counted, 1.5 * tolerance)
+    taken = _covered(cones.sheets, link.counted, 1.5 * tolerance)
     if float(worth[~taken].sum()) < LEAST_GAIN * float(worth.sum()):
         return cones
     candidates = find_ruling_candidates(link.hull, link.axes)
-    ruled = _RuledLink(link, options, worth, [(c, ruled_profile(link, c, _COARSE_GRID, options)) for c in candidates])
+    ruled = _RuledLink(link, options, worth, [(c, c.profile(link, _COARSE_GRID, options)) for c in candidates])
     say("measuring rulings")
     # where the widest region is that of a cone which is there already, other sheets only go beside the cones
     regions = ruled.regions([])
@@ -147,8 +153,8 @@ class _RuledLink:
         done: list[FittedSheet] = []
         while len(done) < most:
             there = [*others, *done]
-            taken = covered_by(there, hull, 1.5 * options.tolerance)
-            best: FoundSheet | None = None
+            taken = _covered(there, hull, 1.5 * options.tolerance)
+            best: _FoundSheet | None = None
             tried = 0
             for area, number, region in self.regions(there):
                 if tried == _REFINED_REGIONS or area < LEAST_GAIN * len(hull) * hull.area:
@@ -157,8 +163,8 @@ class _RuledLink:
                 if best is not None and _lies_on(best.sheet.placed, profile, region, options.tolerance):
                     continue
                 tried += 1
-                fine = _kept_clear(ruled_profile(self.link, candidate, _FINE_GRID, options), there, options)
-                found = fit_sheet(self.link, fine, worth, candidate, options, len(there))
+                fine = _kept_clear(candidate.profile(self.link, _FINE_GRID, options), there, options)
+                found = _fit_sheet(self.link, fine, worth, candidate, options, len(there))
                 if found is None or float(worth[found.covers & ~taken].sum()) < LEAST_GAIN * float(worth.sum()):
                     continue
                 if best is None or found.sheet.touch_share > 1.02 * best.sheet.touch_share:
@@ -168,28 +174,28 @@ class _RuledLink:
             done.append(best.sheet)
         return done
 
-    def regions(self, there: Sequence[FittedSheet]) -> list[tuple[float, int, RuledRegion]]:
+    def regions(self, there: Sequence[FittedSheet]) -> list[tuple[float, int, Region]]:
         """Return the widest region of each profile clear of sheets: area [m2], number, region; the largest first."""
         regions = []
         for number, (candidate, profile) in enumerate(self.coarse):
             free = _kept_clear(profile, there, self.options)
-            region = widest_region(free, candidate, self.options)
+            region = candidate.widest_region(free, self.options)
             if region is not None:
                 regions.append((_area(free, region), number, region))
         return sorted(regions, key=lambda item: -item[0])
 
 
-def _area(profile: RadialProfile, region: RuledRegion) -> float:
+def _area(profile: RadialProfile, region: Region) -> float:
     """Return the area of a region [m2], but for the slope of its section."""
-    cells = profile.radius[region.first : region.end][:, columns_of(region, len(profile.phi))]
+    cells = profile.radius[region.first : region.end][:, profile.azimuths(region.column, region.columns)]
     return float(cells.sum()) * profile.step * math.tau / len(profile.phi)
 
 
-def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: RuledRegion, tolerance: float) -> bool:
+def _lies_on(placed: PlacedFrustum, profile: RadialProfile, region: Region, tolerance: float) -> bool:
     """Tell whether a region is that of a side which is known already."""
     step = max(1, (region.end - region.first) // 4)
     rows = slice(region.first, region.end, step)
-    points = hull_points(profile, rows, columns_of(region, len(profile.phi)))
+    points = profile.points(True, rows, profile.azimuths(region.column, region.columns))
     u, phi, off = placed.locate_all(points)
     slack = 2.0 * profile.step
     on = (np.abs(off) < 1.5 * tolerance) & (u > -slack) & (u < placed.frustum.slant + slack)
@@ -200,7 +206,7 @@ def _kept_clear(profile: RadialProfile, sheets: Sequence[FittedSheet], options: 
     """Return a profile on which no sheet may lie where it would run into another."""
     if not sheets:
         return profile
-    points = hull_points(profile)
+    points = profile.points(True)
     clear = options.thickness + options.gap
     half = 0.5 * profile.step
     for sheet in sheets:
@@ -209,8 +215,147 @@ def _kept_clear(profile: RadialProfile, sheets: Sequence[FittedSheet], options: 
         margin = (clear + half) / max(min(side.radius1, side.radius2), 1e-3)
         inside = (off > -clear) & (off < clear) & (u > -clear - half)
         inside &= (u < side.slant + clear + half) & (phi > -margin) & (phi < side.wrap + margin)
-        profile = profile.blocked(inside.reshape(profile.radius.shape) & (profile.radius > 0.0))
+        profile = profile.blocked(inside & (profile.radius > 0.0))
     return profile
+
+
+_FIT_ROWS = 12  # slices whose points are fitted
+_LEAST_POINTS = 100  # of a region, to fit a side to it
+_CHECK_ROWS = 60  # slices by which a fit is judged
+
+
+class _FoundSheet(NamedTuple):
+    """A fitted side with what is left of its region after the fit was checked."""
+
+    sheet: FittedSheet
+    covers: Bools  #: samples of the hull that it covers, shape (n,)
+
+
+def _fit_sheet(
+    link: SampledLink,
+    profile: RadialProfile,
+    worth: Floats,
+    candidate: RulingCandidate,
+    options: FitOptions,
+    number: int,
+) -> _FoundSheet | None:
+    """Return the sheet of a candidate, fitted on a fine profile and checked there."""
+    region = candidate.widest_region(profile, options)
+    if region is None:
+        return None
+    placed = _side(profile, region, candidate, options)
+    if placed is None:
+        return None
+    rise = _rise(link.mesh, placed, options.tolerance)
+    if rise:
+        placed = placed.parallel(rise)
+    return _checked(profile, region, placed, link.counted, worth, options, rise, number)
+
+
+def _side(
+    profile: RadialProfile, region: Region, candidate: RulingCandidate, options: FitOptions
+) -> Developable | None:
+    """Fit a side to a region."""
+    columns = profile.azimuths(region.column, region.columns)
+    full = region.columns == len(profile.phi)
+    apex, scale = candidate.apex_height(profile), candidate.scale(profile)
+    rows = slice(region.first, region.end)
+    section = np.median(profile.bridged[rows][:, columns] / scale[rows, None], axis=0)
+    turned = profile.phi[columns]
+    out = np.stack([np.cos(turned), np.sin(turned)], axis=1) @ profile.frame.columns[:, :2].T
+    middle = float(profile.z[rows].mean())
+    at = profile.frame.origin + section[:, None] * out
+    if candidate.apex is None:
+        at = at + middle * profile.frame.axis
+        ways = np.broadcast_to(profile.frame.axis, at.shape)
+    else:
+        away = at - candidate.apex
+        away /= np.linalg.norm(away, axis=1)[:, None]
+        reach = abs(apex - middle) / float(np.median(np.abs(away @ profile.frame.axis)))
+        at = candidate.apex + reach * away
+        ways = away if apex < middle else -away
+    step = max(1, (region.end - region.first) // _FIT_ROWS)
+    fitted = slice(region.first, region.end, step)
+    sound = (profile.bridged - profile.radius)[fitted][:, columns] <= options.tolerance
+    points = profile.points(True, fitted, columns)
+    if sound.sum() < _LEAST_POINTS:
+        return None
+    try:
+        return fit_developable(at, ways, points[sound], full, candidate.apex is not None, options.tolerance)
+    except (GeometryError, np.linalg.LinAlgError):
+        return None
+
+
+def _rise(mesh: Mesh, placed: Developable, tolerance: float) -> float:
+    """Return by how much the corners of the facets lie outside the side, which was fitted to the facets [m]."""
+    corners = mesh.vertices if len(mesh.vertices) <= 20_000 else mesh.vertices[:: len(mesh.vertices) // 20_000 + 1]
+    u, phi, off = placed.locate_all(corners)
+    side = placed.frustum
+    near = (np.abs(off) < tolerance) & (u > -tolerance) & (u < side.slant + tolerance)
+    near &= (phi >= 0.0) & (phi <= side.wrap)
+    if near.sum() < 24:
+        return 0.0
+    mean = float(np.median(off[near]))
+    spread = 1.4826 * float(np.median(np.abs(off[near] - mean)))
+    return mean if mean > 0.0 and spread <= 0.3 * mean else 0.0
+
+
+def _checked(
+    profile: RadialProfile,
+    region: Region,
+    placed: Developable,
+    hull: SurfaceSamples,
+    worth: Floats,
+    options: FitOptions,
+    rise: float,
+    number: int,
+) -> _FoundSheet | None:
+    """Return a side cut to the slices in which it is within the tolerance, as a sheet; None where too few are left."""
+    columns = profile.azimuths(region.column, region.columns)
+    step = max(1, (region.end - region.first) // _CHECK_ROWS)
+    rows = np.arange(region.first, region.end, step)
+    rows = rows if rows[-1] == region.end - 1 else np.append(rows, region.end - 1)
+    hole = (profile.bridged - profile.radius)[rows][:, columns] > options.tolerance
+    off = placed.locate_all(profile.points(False, rows, columns))[2]
+    rim = placed.locate_all(profile.points(True, rows, columns))[2] if hole.any() else off
+    within = np.where(hole, rim, off)
+    good = np.asarray((np.abs(within) <= options.tolerance).all(axis=1))
+    run = longest_run(good)
+    if run[1] - run[0] < 2:
+        return None
+    ends = _span(placed, profile, float(profile.z[rows[run[0]]]), float(profile.z[rows[run[1] - 1]]))
+    if ends[1] - ends[0] < options.min_length:
+        return None
+    placed = placed.part(ends[0], ends[1], 0.0, placed.frustum.wrap)
+    narrow = min(placed.frustum.radius1, placed.frustum.radius2)
+    if narrow < options.min_radius * max(1.0, placed.sharpest_bend) or narrow * placed.frustum.wrap < options.min_arc:
+        return None
+    kept = slice(run[0], run[1])
+    seen = off[kept][~hole[kept]]
+    covers = hull.below(placed, 1.5 * options.tolerance)
+    sheet = FittedSheet(
+        placed=placed,
+        max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
+        rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
+        bridged_share=float(hole[kept].mean()),
+        bridged_depth=float(-off[kept][hole[kept]].min()) if hole[kept].any() else 0.0,
+        length_share=placed.frustum.slant / (profile.step * len(profile.z)),
+        area_share=float(covers.mean()),
+        facet_rise=rise,
+        axis=number,
+        touch_share=float(worth[covers].sum() / worth.sum()),
+    )
+    return _FoundSheet(sheet, covers)
+
+
+def _span(placed: Developable, profile: RadialProfile, low: float, high: float) -> tuple[float, float]:
+    """Return the arcs between which all rulings lie between two heights of a profile [m]."""
+    phi = np.linspace(0.0, placed.frustum.wrap, 241)
+    base, way, _ = placed.rulings(phi * (1.0 - 1e-12))
+    pose = placed.link_frustum
+    z = profile.frame.local(pose.apply_all(base))[:, 2]
+    climb = (way @ np.array(pose.rotation).T) @ profile.frame.axis
+    return float(((low - z) / climb).max()), float(((high - z) / climb).min())
 
 
 def find_sheets(

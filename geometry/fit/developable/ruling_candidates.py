@@ -7,12 +7,15 @@ rulings meet in x only if n (p - x) = 0, whatever its section is. In homogeneous
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from coneskin.core.arrays import Bools, Floats, Ints
-from coneskin.geometry.fit.candidates import AxisCandidate
+from coneskin.geometry.displacement_map import bridge_holes
+from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink
+from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, Region
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 
 _DRAW_COUNT = 1600  # pairs, and triples, of samples
@@ -38,6 +41,128 @@ class RulingCandidate:
     origin: Floats
     axis: Floats
     apex: Floats | None = None
+
+    def apex_height(self, profile: RadialProfile) -> float:
+        """Return the height of the apex in the frame of a profile [m]; infinite where the rulings are parallel."""
+        return math.inf if self.apex is None else float((self.apex - profile.frame.origin) @ profile.frame.axis)
+
+    def scale(self, profile: RadialProfile) -> Floats:
+        """Return the size of the section in each slice of a profile, over that at its origin, shape (k,)."""
+        return np.asarray(1.0 - profile.z / self.apex_height(profile))
+
+    def profile(self, link: SampledLink, grid: tuple[int, int], options: FitOptions) -> RadialProfile:
+        """Measure a profile about it, of about so many slices and rays, with holes filled up to its section."""
+        frame = AxisFrame.along(self.origin, self.axis, options.seam)
+        profile = link.profile(frame, grid, options.max_bridge, weighed=False)
+        return _bridged_anew(profile, self.scale(profile), options.max_bridge)
+
+    def widest_region(self, profile: RadialProfile, options: FitOptions) -> Region | None:
+        """Return the region of a profile about it that one sheet can cover."""
+        columns = math.ceil(options.min_wrap / math.tau * len(profile.phi))
+        rows = max(3, math.ceil(options.min_length / profile.step))
+        least = np.full(len(profile.z), 0.25 * options.min_radius)
+        scale, full_only = self.scale(profile), options.wrap == math.tau
+        return _ruled_region(profile, scale, options.tolerance, rows, least, columns, full_only)
+
+
+def _bridged_anew(profile: RadialProfile, scale: Floats, width: float) -> RadialProfile:
+    """Return a profile whose holes are filled up to its section: the short radii of an oval are no hole."""
+    scale = np.maximum(scale, 0.05)
+    shown = np.where(profile.radius > 0.0, profile.radius / scale[:, None], np.nan)
+    present = np.isfinite(shown).any(axis=0)
+    if not present.any():
+        return profile
+    section = np.where(present, np.nanmedian(np.where(present, shown, 1.0), axis=0), 0.0) * scale[:, None]
+    lift = float(section.max())
+    depth = np.where(profile.radius > 0.0, np.maximum(profile.radius - section + lift, 1e-6), 0.0)
+    arc = math.tau / len(profile.phi) * float(np.median(section[:, present]))
+    filled = bridge_holes(depth, profile.step, arc, width) - lift + section
+    return replace(profile, bridged=np.maximum(filled, profile.radius))
+
+
+def _ruled_region(
+    profile: RadialProfile,
+    scale: Floats,
+    tolerance: float,
+    rows: int,
+    least: Floats,
+    least_columns: int,
+    full_only: bool = False,
+) -> Region | None:
+    """Return the region of largest area in which every column is straight within a tolerance.
+
+    Args:
+        profile: the hull about a line.
+        scale: size of the section in each row, over that at the origin, shape (k,).
+        tolerance: largest distance from the ruling, across it [m].
+        rows: least number of rows.
+        least: smallest radius a sheet may have in each row [m], shape (k,).
+        least_columns: least number of columns.
+        full_only: True for full wraps only.
+    """
+    usable = scale > 0.05
+    scale = np.where(usable, scale, 1.0)[:, None]
+    around = len(profile.phi)
+    top, low = profile.radius / scale, profile.floor(tolerance) / scale
+    good = profile.free() & usable[:, None] & (low > 0.0) & (profile.floor(tolerance) >= least[:, None])
+    oblique = _obliquity(top, good)
+    limit = 2.0 * tolerance * oblique / scale  # shape (k, p)
+    best: Region | None = None
+    worth = 0.0
+    count = len(profile.z)
+    for first in range(count - rows + 1):
+        if (count - first) * around <= worth:
+            break
+        if not good[first].any():
+            continue
+        high, floor, tight = top[first].copy(), low[first].copy(), limit[first].copy()
+        alive = good[first].copy()
+        for end in range(first + 1, count + 1):
+            if end - first > 1:
+                row = end - 1
+                np.maximum(high, top[row], out=high)
+                np.minimum(floor, low[row], out=floor)
+                np.minimum(tight, limit[row], out=tight)
+                alive &= good[row] & (high - floor <= tight)
+            kept = int(alive.sum())
+            if kept < least_columns or kept * (count - first) <= worth:
+                break
+            if end - first < rows or kept * (end - first) <= worth:
+                continue
+            if kept == around:
+                best, worth = Region(first, end, 0, around), float(around * (end - first))
+                continue
+            if full_only:
+                break
+            column, run = _longest_run(alive)
+            if run >= least_columns and run * (end - first) > worth:
+                best, worth = Region(first, end, column, run), float(run * (end - first))
+    return best
+
+
+def _obliquity(radius: Floats, good: Bools) -> Floats:
+    """Return by how much a distance along a ray exceeds that square to the surface, for each column, shape (p,)."""
+    shown = np.where(good & (radius > 0.0), radius, np.nan)  # a hole that is spanned may have no surface
+    around = radius.shape[1]
+    section = np.ones(around)
+    for column in range(around):
+        values = shown[:, column][np.isfinite(shown[:, column])]
+        section[column] = float(np.median(values)) if len(values) else np.nan
+    if not np.isfinite(section).any():
+        return np.ones(around)
+    section = np.where(np.isfinite(section), section, np.nanmedian(section))
+    slope = (np.roll(section, -1) - np.roll(section, 1)) / (4.0 * np.pi / around * section)
+    return np.asarray(np.minimum(np.hypot(1.0, slope), 2.0))
+
+
+def _longest_run(alive: Bools) -> tuple[int, int]:
+    """Return the first column and the length of the longest run of a ring."""
+    gaps = np.flatnonzero(~alive)
+    if len(gaps) == 0:
+        return 0, len(alive)
+    lengths = np.diff(np.concatenate([gaps, [gaps[0] + len(alive)]])) - 1
+    longest = int(lengths.argmax())
+    return int((gaps[longest] + 1) % len(alive)), int(lengths[longest])
 
 
 def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -> list[RulingCandidate]:

@@ -131,7 +131,7 @@ def test_other_sheets_take_the_place_of_cones_only_for_a_clear_gain(
     ruled = SimpleNamespace(regions=lambda _: [], packed=lambda others, _: [] if others else [other])
     refused = []
     for name, value in {
-        "covered_by": np.zeros(4, bool),
+        "_covered": np.zeros(4, bool),
         "find_ruling_candidates": [],
         "_RuledLink": ruled,
         "hull_note": "a hull",  # which is asked for only where they would be taken

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from coneskin.geometry.fit.developable.found_sheet import _ruled_region
+from coneskin.geometry.fit.developable.ruling_candidates import _ruled_region
 
 from ..profile_cases import profile_of
 
@@ -17,6 +17,6 @@ def test_a_slot_that_a_sheet_spans_is_no_slope_of_the_section() -> None:
     radius = tube.radius.copy()
     radius[:, 7] = 0.0
     with np.errstate(all="raise"):
-        region = _ruled_region(replace(tube, radius=radius), None, 0.001, 25, np.full(60, 0.004), 25)
+        region = _ruled_region(replace(tube, radius=radius), np.ones(60), 0.001, 25, np.full(60, 0.004), 25)
     assert region is not None
     assert (region.first, region.end, region.columns) == (0, 60, 60)
