@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import KinematicsError, SceneError
@@ -15,10 +14,10 @@ from coneskin.core.files import read_file
 from coneskin.core.keys import check
 from coneskin.core.toml_text import parse_toml
 
-from .tables.arm_tables import read_arm, read_bodies, read_monitoring, read_motion, read_padding, read_reaction
+from .tables.arm_tables import read_arm_tables
 from .tables.keys import COMMISSIONING_KEYS, MAX_SIZE, RECORDING_KEYS
 from .tables.sensor_tables import inline_sensor_files, read_links, sensor_tables
-from .tables.source_tables import read_sources, read_touch
+from .tables.source_tables import read_source
 from .values import scene as s
 
 if TYPE_CHECKING:
@@ -106,32 +105,26 @@ def parse_scene(
 
         limited = inline_speed_limit(tables, opened, problems)
     text = inline_sensor_files(tables, opened, problems, calibrated, limited) or text
-    reaction, rules = read_reaction(tables, problems)
     commissioned = check(tables.get("commissioning", {}), COMMISSIONING_KEYS, "commissioning", problems)
     scene = s.Scene(
         name=name,
         text=text,
         folder=folder,
-        arm=read_arm(tables, problems),
+        **read_arm_tables(tables, problems),
         links=read_links(tables, opened, problems),
-        source=None,
-        reaction=reaction,
-        rules=rules,
-        monitoring=read_monitoring(tables, problems),
         recording=_recording(tables, folder, problems),
-        motion=read_motion(tables, problems),
         commissioning_max_age=commissioned.get("max_age"),
         commissioning=commissioning,
-        bodies=read_bodies(tables, problems),
-        padding=read_padding(tables, problems),
     )
-    scene = replace(scene, source=_source(scene, tables, problems))
+    if "source" in tables:
+        built = [item.sensor for item in scene.sensors]
+        sensors = [*built, *[None] * (len(sensor_tables(tables)) - len(built))]
+        scene = replace(scene, source=read_source(tables["source"], sensors, problems))
     _check_together(scene, named, tables, problems)
     if "speed_limit" in tables:
-        from .tables.speed_limit_tables import check_speed_limit, read_speed_limit
+        from .tables.speed_limit_tables import with_speed_limit
 
-        scene = replace(scene, speed_limit=read_speed_limit(tables, problems))
-        check_speed_limit(scene, recorded, problems)
+        scene = with_speed_limit(scene, tables["speed_limit"], recorded, problems)
     if problems:
         raise SceneError(problems, name)
     return scene
@@ -139,21 +132,6 @@ def parse_scene(
 
 def _is_array_of_tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
-
-
-def _source(scene: s.Scene, tables: Mapping[str, Any], problems: list[str]) -> s.SourceScene | None:
-    if "source" not in tables:
-        return None
-    values = read_sources(tables["source"], problems)
-    built = [item.sensor for item in scene.sensors]
-    sensors = [*built, *[None] * (len(sensor_tables(tables)) - len(built))]
-    touches = [
-        touch
-        for number, table in enumerate(values.pop("touch", ()), 1)
-        if (touch := read_touch(sensors, table, f"source.touch {number}", problems)) is not None
-    ]
-    kind = values.pop("kind", None)
-    return None if kind is None else s.SourceScene(kind, MappingProxyType(values), tuple(touches))
 
 
 def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:

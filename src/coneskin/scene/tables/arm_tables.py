@@ -1,8 +1,4 @@
-"""Readers of the tables of an arm: [arm], [monitoring], [reaction], [motion], [[body]] and [padding].
-
-Each takes the tables of the whole file, and adds every mistake to ``problems``. What is not there is None, as is what
-has a mistake.
-"""
+"""Reader of the tables of an arm: [arm], [monitoring], [reaction], [motion], [[body]] and [padding]."""
 
 from __future__ import annotations
 
@@ -37,11 +33,19 @@ _NEEDED_VALUES = {
 }
 
 
-def read_arm(tables: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
-    """Return the arm."""
-    if "arm" not in tables:
-        return None
-    values = check(tables["arm"], k.ARM_KEYS, "arm", problems)
+def read_arm_tables(tables: Mapping[str, Any], problems: list[str]) -> dict[str, Any]:
+    """Return what the tables of the whole file say of the arm, as fields of ``Scene``; None for what is not there.
+
+    Every mistake is added to the problems; what has one is None as well.
+    """
+    reaction, rules = _reaction(tables["reaction"], problems) if "reaction" in tables else (None, ())
+    readers = {"arm": _arm, "monitoring": _monitoring, "motion": _motion, "padding": _padding}
+    found = {name: read(tables[name], problems) if name in tables else None for name, read in readers.items()}
+    return {**found, "reaction": reaction, "rules": rules, "bodies": _bodies(tables.get("body", []), problems)}
+
+
+def _arm(table: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
+    values = check(table, k.ARM_KEYS, "arm", problems)
     if "model" in values:
         from coneskin.robot.arm.models import arm_model
 
@@ -62,20 +66,15 @@ def read_arm(tables: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
     return ArmScene(watchdog_hz=values.pop("watchdog"), **values)
 
 
-def read_monitoring(tables: Mapping[str, Any], problems: list[str]) -> MonitoringLimits | None:
-    """Return the limits of [monitoring], the defaults included; None where the scene has no such table."""
-    if "monitoring" not in tables:
-        return None
+def _monitoring(table: Mapping[str, Any], problems: list[str]) -> MonitoringLimits:
+    """Return the limits of [monitoring], the defaults included."""
     from coneskin.robot.stop.limits import MonitoringLimits
 
-    return MonitoringLimits(**_given(check(tables["monitoring"], k.MONITORING_KEYS, "monitoring", problems)))
+    return MonitoringLimits(**_given(check(table, k.MONITORING_KEYS, "monitoring", problems)))
 
 
-def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene | None:
-    """Return the motion."""
-    if "motion" not in tables:
-        return None
-    rows = tables["motion"].get("waypoints_deg")
+def _motion(table: Mapping[str, Any], problems: list[str]) -> MotionScene | None:
+    rows = table.get("waypoints_deg")
     points = []
     if isinstance(rows, list):
         for number, row in enumerate(rows, 1):
@@ -85,20 +84,18 @@ def read_motion(tables: Mapping[str, Any], problems: list[str]) -> MotionScene |
             problems += [line.replace(f"{where}.q_deg", where) for line in lines]
         if len(rows) < 2:
             problems.append(f"motion.waypoints_deg needs at least 2 waypoints, got {len(rows)}")
-    table = {key: value for key, value in tables["motion"].items() if key != "waypoints_deg"}
-    values = check(table, k.MOTION_KEYS[1:], "motion", problems)
+    others = {key: value for key, value in table.items() if key != "waypoints_deg"}
+    values = check(others, k.MOTION_KEYS[1:], "motion", problems)
     if not isinstance(rows, list):
         problems.append("motion.waypoints_deg must be a list of lists of 6 joint positions [deg]")
     return MotionScene(tuple(points), **values) if len(values) == len(k.MOTION_KEYS) - 1 else None
 
 
-def read_reaction(tables: Mapping[str, Any], problems: list[str]) -> tuple[Reaction | None, tuple[Rule, ...]]:
+def _reaction(table: Mapping[str, Any], problems: list[str]) -> tuple[Reaction | None, tuple[Rule, ...]]:
     """Return the reaction of a scene, and its rules in order; a rule with a mistake is left out."""
-    if "reaction" not in tables:
-        return None, ()
     from coneskin.robot.reaction.types import Reaction
 
-    values = _given(check(tables["reaction"], k.REACTION_KEYS, "reaction", problems))
+    values = _given(check(table, k.REACTION_KEYS, "reaction", problems))
     rows = values.pop("rule", ())
     reaction = Reaction(**values) if "kind" in values else None
     rules = [_rule(row, f"reaction.rule {n}", reaction or Reaction(), problems) for n, row in enumerate(rows, 1)]
@@ -127,9 +124,9 @@ def _given(values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def read_bodies(tables: Mapping[str, Any], problems: list[str]) -> tuple[BodyScene, ...]:
+def _bodies(table: Any, problems: list[str]) -> tuple[BodyScene, ...]:
     """Return the bodies of a scene; one with a mistake is left out."""
-    rows = check({"body": tables.get("body", [])}, (Key("body", dict, ()),), "scene", problems)["body"]
+    rows = check({"body": table}, (Key("body", dict, ()),), "scene", problems)["body"]
     found = [_body(row, f"body {number}", problems) for number, row in enumerate(rows, 1)]
     return tuple(body for body in found if body is not None)
 
@@ -151,11 +148,9 @@ def _body(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyScene 
     return BodyScene(**{name: value for name, value in values.items() if value is not None})
 
 
-def read_padding(tables: Mapping[str, Any], problems: list[str]) -> Padding | None:
+def _padding(table: Mapping[str, Any], problems: list[str]) -> Padding:
     """Return the padding of a scene's skins; what has a mistake has its default."""
-    if "padding" not in tables:
-        return None
     from coneskin.skin.materials import Padding
 
-    values = check(tables["padding"], k.PADDING_KEYS, "padding", problems)
+    values = check(table, k.PADDING_KEYS, "padding", problems)
     return Padding(values["thickness"], values["stiffness"], values["hard"], values["loss"])

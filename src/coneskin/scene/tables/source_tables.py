@@ -5,22 +5,40 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SensorError
 from coneskin.core.keys import Key, check
+from coneskin.scene.values.scene import SourceScene
 from coneskin.skin.sources.kinds import GROUP, SOURCE_KINDS, find_kind
 
 from .keys import TOUCH_KEYS, source_keys
 
 if TYPE_CHECKING:
-    from coneskin.scene.values.scene import SourceScene
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
 
-def read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
-    """Check a [source] table, or several [[source]], and convert them; every mistake is added to the problems.
+def read_source(
+    tables: Mapping[str, Any] | Sequence[Any], sensors: Sequence[Sensor | None], problems: list[str]
+) -> SourceScene | None:
+    """Read a [source] table, or several [[source]]; None where the kind is missing or wrong.
+
+    Args:
+        sensors: that a script may touch; None stands for each that has a mistake.
+        problems: every mistake is added to them.
+    """
+    values = _read_sources(tables, problems)
+    rows = enumerate(values.pop("touch", ()), 1)
+    touches = [_read_touch(sensors, row, f"source.touch {number}", problems) for number, row in rows]
+    kind = values.pop("kind", None)
+    made = tuple(touch for touch in touches if touch is not None)
+    return None if kind is None else SourceScene(kind, MappingProxyType(values), made)
+
+
+def _read_sources(tables: Mapping[str, Any] | Sequence[Any], problems: list[str]) -> dict[str, Any]:
+    """Check a [source] table, or several [[source]], and convert them.
 
     Returns:
         as ``_read_source`` does; of several the kind is ``GROUP`` and ``members`` holds kind and values of each.
@@ -85,10 +103,10 @@ def _optional(key: Key) -> Key:
     return replace(key, default=None) if key.default is ... else key
 
 
-def read_touch(
+def _read_touch(
     sensors: Sequence[Sensor | None], table: Mapping[str, Any], where: str, problems: list[str]
 ) -> ScriptedTouch | None:
-    """Read a scripted touch; among the sensors, None stands for each that has a mistake."""
+    """Read a scripted touch."""
     from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 
     before = len(problems)

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,10 +95,21 @@ def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
     tables["speed_limit"] = found["speed_limit"]
 
 
-def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLimitScene | None:
-    """Return the permissible speeds of a scene that has some; None where they have a mistake, which is added."""
+def with_speed_limit(scene: Scene, table: Mapping[str, Any], recorded: bool, problems: list[str]) -> Scene:
+    """Return a scene with the permissible speeds of a table, and add what stands against them to the problems.
+
+    Args:
+        recorded: it comes from a recording, and was checked when the guard began.
+    """
+    limit = _read_limit(table, problems)
+    if limit is not None:
+        _check_limit(scene, limit, recorded, problems)
+    return replace(scene, speed_limit=limit)
+
+
+def _read_limit(table: Mapping[str, Any], problems: list[str]) -> SpeedLimitScene | None:
+    """Return the permissible speeds of a table; None where they have a mistake, which is added."""
     lines: list[str] = []
-    table = tables["speed_limit"]
     values = check(table, SPEED_LIMIT_KEYS, "speed_limit", lines)
     digest = values.pop("digest", "")
     rows = values.pop("curve", ())[:MAX_ROWS]
@@ -117,17 +128,9 @@ def read_speed_limit(tables: Mapping[str, Any], problems: list[str]) -> SpeedLim
     return None if lines else found
 
 
-def check_speed_limit(scene: Scene, recorded: bool, problems: list[str]) -> None:
-    """Add what stands against the permissible speeds of a scene to the problems.
-
-    Args:
-        recorded: it comes from a recording, and was checked when the guard began.
-    """
+def _check_limit(scene: Scene, limit: SpeedLimitScene, recorded: bool, problems: list[str]) -> None:
     from coneskin.robot.arm.kinematics import link_index
 
-    limit = scene.speed_limit
-    if limit is None:
-        return
     if scene.arm is None:
         problems.append("[speed_limit] needs an [arm] that can be slowed down")
         return
