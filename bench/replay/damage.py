@@ -14,7 +14,7 @@ from pathlib import Path
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.core.recording.block import Block
-from coneskin.core.recording.chunk import FILE_HEAD_SIZE, decode_body
+from coneskin.core.recording.chunk import FILE_HEAD_SIZE
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.scan import Chunk, walk
 from coneskin.runs.replay.run import Verdict, read_run
@@ -108,7 +108,7 @@ def _judge(hurt: bytes, data: bytes, whole: list[Chunk], folder: Path, again: bo
 
 
 def _blocks(chunk: Chunk) -> list[Block]:
-    return [block for block in decode_body(chunk.head, chunk.stored) if 0 < block.kind < 240]
+    return [block for block in chunk.blocks() if 0 < block.kind < 240]
 
 
 def _chunks(data: bytes, path: Path) -> list[Chunk]:

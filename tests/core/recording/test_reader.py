@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.recording import reader
 from coneskin.core.recording.block import Block, is_time
 from coneskin.core.recording.chunk import CHUNK_HEAD_SIZE, FILE_HEAD_SIZE, MAX_BODY, encode_chunk
 from coneskin.core.recording.defects import DefectKind
@@ -187,8 +186,8 @@ def test_no_damage_yields_a_false_block_or_hides_an_intact_one(
 
 def test_a_seek_reads_what_it_needs(whole: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     blocks, unpacked = read(whole, tmp_path / "run.rec"), []
-    decode = reader.decode_body
-    monkeypatch.setattr(reader, "decode_body", lambda *chunk: unpacked.append(chunk) or decode(*chunk))
+    unpack = Chunk.blocks
+    monkeypatch.setattr(Chunk, "blocks", lambda chunk: unpacked.append(chunk) or unpack(chunk))
     assert list(blocks.select(1000.25, 1000.30)) == [block(n) for n in range(25, 31)]
     assert len(unpacked) == 3
     assert list(blocks.select(kinds=frozenset({2}))) == [block(n) for n in range(1, 3 * COUNT, 3)]

@@ -56,6 +56,50 @@ class ChunkHead:
         """Number of the chunk that must come next."""
         return self.sequence + self.span
 
+    @classmethod
+    def decode(cls, data: bytes, at: int = 0) -> ChunkHead | None:
+        """Return the head at an offset; None where there is none: sync, checksum or a limit is wrong."""
+        if data[at : at + 4] != SYNC or len(data) < at + CHUNK_HEAD_SIZE:
+            return None
+        _, *fields, crc = _CHUNK_HEAD.unpack_from(data, at)
+        if zlib.crc32(data[at : at + CHUNK_HEAD_SIZE - 4]) != crc:
+            return None
+        head = cls(*fields)
+        timed = is_time(head.since) and is_time(head.until) and head.since <= head.until
+        return head if timed and head.length <= MAX_BODY and head.span and head.blocks else None
+
+    def unpacked(self, stored: bytes) -> list[Block]:
+        """Return the blocks of a stored body whose checksum is right.
+
+        Raises:
+            RecordingError: the body is not what this head says: it was made so, not damaged.
+        """
+        try:
+            blocks = decode_blocks(self._plain(stored))
+        except RecordingError as exc:
+            raise self._wrong(str(exc)) from None
+        for _, time, _ in blocks:
+            if not self.since <= time <= self.until:
+                raise self._wrong(f"a block of it has the time {time} s")
+        return blocks
+
+    def _plain(self, stored: bytes) -> bytes:
+        if self.encoding == _PLAIN:
+            return stored
+        if self.encoding != _ZLIB:
+            raise RecordingError(f"its encoding {self.encoding} is none of 0 (plain) and 1 (zlib)")
+        unpacker = zlib.decompressobj()
+        try:
+            body = unpacker.decompress(stored, MAX_BODY)
+        except zlib.error as exc:
+            raise RecordingError(str(exc)) from exc
+        if not unpacker.eof or unpacker.unused_data:
+            raise RecordingError(f"it has more than {MAX_BODY} bytes, or ends too early")
+        return body
+
+    def _wrong(self, what: str) -> RecordingError:
+        return RecordingError(f"chunk {self.sequence} of {self.since:.6f} s is not what its head says: {what}")
+
 
 def bits(kinds: Sequence[int] | frozenset[int]) -> int:
     """Return kinds of block as the bits of ``ChunkHead.kinds``."""
@@ -90,54 +134,3 @@ def encode_chunk(run: int, sequence: int, blocks: Sequence[Block], span: int = 1
     fields = (SYNC, len(stored), run, sequence, span, len(blocks), bits({block.kind for block in blocks}))  # type: ignore[arg-type]
     head = _CHUNK_HEAD.pack(*fields, min(times), max(times), encoding, zlib.crc32(stored), 0)[:-4]
     return head + struct.pack("<I", zlib.crc32(head)) + stored
-
-
-def decode_chunk_head(data: bytes, at: int = 0) -> ChunkHead | None:
-    """Return the head at an offset; None where there is none: sync, checksum or a limit is wrong."""
-    if data[at : at + 4] != SYNC or len(data) < at + CHUNK_HEAD_SIZE:
-        return None
-    _, length, run, sequence, span, blocks, kinds, since, until, encoding, body_crc, crc = _CHUNK_HEAD.unpack_from(
-        data, at
-    )
-    if zlib.crc32(data[at : at + CHUNK_HEAD_SIZE - 4]) != crc:
-        return None
-    if length > MAX_BODY or not span or not blocks or not (is_time(since) and is_time(until) and since <= until):
-        return None
-    return ChunkHead(length, run, sequence, span, blocks, kinds, since, until, encoding, body_crc)
-
-
-def decode_body(head: ChunkHead, stored: bytes) -> list[Block]:
-    """Return the blocks of a chunk whose checksum is right.
-
-    Raises:
-        RecordingError: the body is not what its head says: it was made so, not damaged.
-    """
-    body = _unpacked(head, stored)
-    try:
-        blocks = decode_blocks(body)
-    except RecordingError as exc:
-        raise _wrong(head, str(exc)) from None
-    since, until = head.since, head.until
-    for _, time, _ in blocks:
-        if not since <= time <= until:
-            raise _wrong(head, f"a block of it has the time {time} s")
-    return blocks
-
-
-def _unpacked(head: ChunkHead, stored: bytes) -> bytes:
-    if head.encoding == _PLAIN:
-        return stored
-    if head.encoding != _ZLIB:
-        raise _wrong(head, f"its encoding {head.encoding} is none of 0 (plain) and 1 (zlib)")
-    unpacker = zlib.decompressobj()
-    try:
-        body = unpacker.decompress(stored, MAX_BODY)
-    except zlib.error as exc:
-        raise _wrong(head, str(exc)) from exc
-    if not unpacker.eof or unpacker.unused_data:
-        raise _wrong(head, f"it has more than {MAX_BODY} bytes, or ends too early")
-    return body
-
-
-def _wrong(head: ChunkHead, what: str) -> RecordingError:
-    return RecordingError(f"chunk {head.sequence} of {head.since:.6f} s is not what its head says: {what}")

@@ -65,6 +65,30 @@ class Defect:
     kinds: frozenset[int] | None = None
     note: str = ""
 
+    @classmethod
+    def noted(cls, block: Block) -> Defect:
+        """Return what a note says that retention has dropped.
+
+        Raises:
+            RecordingError: it says nothing that can be.
+        """
+        try:
+            facts: dict[str, Any] = read_json(block.payload)
+            since, until, blocks, size = (facts[key] for key in ("since", "until", "blocks", "bytes"))
+            kinds = frozenset(facts["kinds"])
+            whole = all(type(count) is int and count >= 0 for count in (blocks, size, *kinds))
+            if block.kind != DROPPED or not whole or not (is_time(since) and is_time(until)):
+                raise ValueError("a time or a number cannot be")
+        except (ValueError, TypeError, KeyError) as exc:
+            raise RecordingError(f"the block of {block.time:.6f} s does not say what was dropped: {exc}") from exc
+        return cls(DefectKind.DROPPED, since, until, size=size, blocks=blocks, kinds=kinds)
+
+    def note_block(self) -> Block:
+        """Return the note of what was dropped, which stands where it began."""
+        kinds = sorted(self.kinds or ())
+        facts = {"since": self.since, "until": self.until, "blocks": self.blocks, "bytes": self.size, "kinds": kinds}
+        return Block(DROPPED, self.since, json.dumps(facts).encode())
+
     @property
     def inputs_missing(self) -> bool:
         """True where what went into the guard is missing, so that nothing after it can be compared."""
@@ -240,33 +264,3 @@ class _Holes:
         at = bisect_right(self._firsts, number) - 1
         hole = self._holes[at] if at >= 0 else None
         return hole if hole is not None and number < (hole.following or number + 1) else None
-
-
-def encode_drop(time: float, defect: Defect) -> Block:
-    """Return the note of what was dropped, the extent of a defect, written at a time [s, host clock]."""
-    facts = {
-        "since": defect.since,
-        "until": defect.until,
-        "blocks": defect.blocks,
-        "bytes": defect.size,
-        "kinds": sorted(defect.kinds or ()),
-    }
-    return Block(DROPPED, time, json.dumps(facts).encode())
-
-
-def decode_drop(block: Block) -> Defect:
-    """Return what a note says.
-
-    Raises:
-        RecordingError: it says nothing that can be.
-    """
-    try:
-        facts: dict[str, Any] = read_json(block.payload)
-        since, until, blocks, size = (facts[key] for key in ("since", "until", "blocks", "bytes"))
-        kinds = frozenset(facts["kinds"])
-        whole = all(type(count) is int and count >= 0 for count in (blocks, size, *kinds))
-        if block.kind != DROPPED or not whole or not (is_time(since) and is_time(until)):
-            raise ValueError("a time or a number cannot be")
-    except (ValueError, TypeError, KeyError) as exc:
-        raise RecordingError(f"the block of {block.time:.6f} s does not say what was dropped: {exc}") from exc
-    return Defect(DefectKind.DROPPED, since, until, size=size, blocks=blocks, kinds=kinds)

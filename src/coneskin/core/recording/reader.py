@@ -16,8 +16,8 @@ from coneskin.core.files import explain_os_error, open_file
 from coneskin.core.progress import Progress, silent
 
 from .block import ALL_KINDS, COPY, DROPPED, FILE_KINDS, Block, decode_copy
-from .chunk import FILE_HEAD_SIZE, LAST_BIT, MAGIC, bits, decode_body, decode_file_head
-from .defects import Defect, decode_drop, find_defects
+from .chunk import FILE_HEAD_SIZE, LAST_BIT, MAGIC, bits, decode_file_head
+from .defects import Defect, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, walk
 
 MAX_SIZE = 1 << 36  #: bytes of a file: two years of one sensor and an arm; it is never held in memory
@@ -79,7 +79,7 @@ class Recording:
         mask = bits(shown)
         unlike = ~bits([kind for kind in shown if kind < LAST_BIT])  # a chunk of such a kind shows a part of it
         for chunk in self._chunks(since, until, mask):
-            head, blocks = chunk.head, decode_body(chunk.head, chunk.stored)
+            head, blocks = chunk.head, chunk.blocks()
             if head.kinds & unlike or head.since < since or head.until > until:
                 blocks = [block for block in blocks if block.kind in shown and since <= block.time <= until]
             if blocks:
@@ -149,7 +149,7 @@ def read_recording(path: Path, progress: Progress = silent) -> Recording:
     progress(1.0)
     own, defects = find_defects(extents, damages, extents[0].run if run is None else run)
     notes = list(Recording(own, hidden=frozenset()).select(kinds=frozenset({COPY, DROPPED})))
-    dropped = (decode_drop(block) for block in notes if block.kind == DROPPED)
+    dropped = (Defect.noted(block) for block in notes if block.kind == DROPPED)
     copies = tuple(decode_copy(block) for block in notes if block.kind == COPY)
     every = tuple(sorted((*defects, *dropped), key=lambda defect: defect.since))
     return Recording(own, copies, every, sum(sizes))

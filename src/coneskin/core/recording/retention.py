@@ -12,8 +12,8 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of, explain_os_error, open_file
 
 from .block import FILE_KINDS, Block
-from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head, encode_chunk
-from .defects import Defect, DefectKind, encode_drop
+from .chunk import FILE_HEAD_SIZE, bits, decode_file_head, encode_chunk
+from .defects import Defect, DefectKind
 from .reader import MAX_SIZE
 from .recorder import open_for_owner
 from .scan import Chunk, walk
@@ -91,7 +91,7 @@ class _Shortened:
         if not self._span:
             self._first = chunk.head.sequence
         self._span += chunk.head.span
-        for block in decode_body(chunk.head, chunk.stored):
+        for block in chunk.blocks():
             if block.kind in kept:
                 self._blocks.append(block)
                 self._size += len(block.payload)
@@ -109,7 +109,7 @@ class _Shortened:
             extent = Defect(
                 DefectKind.DROPPED, self._since, self._until, size=self._bytes, blocks=self._dropped, kinds=kinds
             )
-            blocks = [encode_drop(self._since, extent), *blocks]
+            blocks = [extent.note_block(), *blocks]
         data = encode_chunk(self._run, self._first, blocks, self._span)
         self._start()
         return data

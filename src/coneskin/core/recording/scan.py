@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from .chunk import CHUNK_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead, decode_chunk_head
+from .block import Block
+from .chunk import CHUNK_HEAD_SIZE, MAX_BODY, SYNC, ChunkHead
 
 _SEARCH_WINDOW = 1 << 18  # bytes that are searched at once
 _SEARCH_LENGTH = MAX_BODY + CHUNK_HEAD_SIZE + _SEARCH_WINDOW  # bytes within which one of the first two chunks begins
@@ -26,6 +27,14 @@ class Chunk(NamedTuple):
     def end(self) -> int:
         """Offset of what follows it."""
         return self.offset + CHUNK_HEAD_SIZE + len(self.stored)
+
+    def blocks(self) -> list[Block]:
+        """Return its blocks.
+
+        Raises:
+            RecordingError: it holds what cannot be.
+        """
+        return self.head.unpacked(self.stored)
 
 
 class Damage(NamedTuple):
@@ -93,7 +102,7 @@ def walk(file: BinaryIO, at: int, size: int) -> Iterator[Chunk | Damage]:
     file.seek(at)
     while at < size:
         data = file.read(CHUNK_HEAD_SIZE)
-        head = decode_chunk_head(data)
+        head = ChunkHead.decode(data)
         if head is not None:
             end = at + CHUNK_HEAD_SIZE + head.length
             stored = file.read(head.length) if end <= size else b""
@@ -117,7 +126,7 @@ def _find(file: BinaryIO, at: int, size: int) -> int:
         window = file.read(min(_SEARCH_WINDOW + CHUNK_HEAD_SIZE, size - at))
         found = window.find(SYNC)
         while 0 <= found < _SEARCH_WINDOW:
-            if decode_chunk_head(window, found) is not None:
+            if ChunkHead.decode(window, found) is not None:
                 return at + found
             found = window.find(SYNC, found + 1)
         at += _SEARCH_WINDOW

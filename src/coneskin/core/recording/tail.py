@@ -12,7 +12,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import open_file
 
 from .block import END, Block
-from .chunk import FILE_HEAD_SIZE, bits, decode_body, decode_file_head
+from .chunk import FILE_HEAD_SIZE, bits, decode_file_head
 from .reader import MAX_SIZE
 from .recorder import part_path
 from .scan import Chunk, walk
@@ -62,7 +62,7 @@ class RecordingTail:
             while recent and recent[0].head.until < newest - self._keep:
                 recent.popleft()
         kept = sorted([*always, *recent], key=lambda chunk: chunk.head.sequence)
-        found = [block for chunk in kept for block in decode_body(chunk.head, chunk.stored)]
+        found = [block for chunk in kept for block in chunk.blocks()]
         self.ended = self.ended or any(block.kind == END for block in found)
         return found
 
