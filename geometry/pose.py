@@ -90,6 +90,35 @@ class Pose:
             (xyz[0], xyz[1], xyz[2]),
         )
 
+    @classmethod
+    def along(cls, direction: Vector, xyz: Vector = (0.0, 0.0, 0.0)) -> Pose:
+        """Make a pose whose z axis is along a direction of any length, and its origin at xyz [m]."""
+        length = math.hypot(*direction) or 1.0
+        z = (direction[0] / length, direction[1] / length, direction[2] / length)
+        a, b, c = _cross((1.0, 0.0, 0.0) if abs(z[0]) < 0.7 else (0.0, 1.0, 0.0), z)
+        length = math.hypot(a, b, c)
+        x = (a / length, b / length, c / length)
+        y = _cross(z, x)
+        return cls.trusted(((x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])), xyz)
+
+    @property
+    def quaternion(self) -> tuple[float, float, float, float]:
+        """Rotation as w, x, y, z (Shepperd's method)."""
+        (a, b, c), (d, e, f), (g, h, i) = self.rotation
+        trace = a + e + i
+        parts = (trace, a, e, i)
+        largest = parts.index(max(parts))
+        if largest == 0:
+            w, x, y, z = 1.0 + trace, h - f, c - g, d - b
+        elif largest == 1:
+            w, x, y, z = h - f, 1.0 + a - e - i, b + d, c + g
+        elif largest == 2:
+            w, x, y, z = c - g, b + d, 1.0 - a + e - i, f + h
+        else:
+            w, x, y, z = d - b, c + g, f + h, 1.0 - a - e + i
+        size = math.hypot(w, x, y, z)
+        return w / size, x / size, y / size, z / size
+
     @property
     def rotation_vector(self) -> Vector:
         """Rotation vector [rad], its angle in [0, pi]; exact near 0 and near pi."""

@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from .robot.sim.process import SimulatedController as SimulatedController
     from .runs.replay.run import Run as Run
     from .runs.replay.run import read_run as read_run
-    from .runs.what_if.batch import judge_runs as judge_runs
+    from .runs.what_if.what_if import judge_runs as judge_runs
     from .runs.what_if.what_if import what_if as what_if
     from .scene.build import place_on_arm as place_on_arm
     from .scene.reader import load_scene as load_scene
@@ -101,8 +101,7 @@ _PUBLIC = {
     "robot.reaction.rules": "Rule",
     "robot.reaction.types": "Reaction",
     "robot.sim.process": "SimulatedController",
-    "runs.what_if.batch": "judge_runs",
-    "runs.what_if.what_if": "what_if",
+    "runs.what_if.what_if": "judge_runs what_if",
     "scene.build": "place_on_arm",
     "scene.reader": "load_scene parse_scene",
     "scene.values.scene": "Commissioning Scene",

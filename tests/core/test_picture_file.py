@@ -13,7 +13,7 @@ from coneskin.commissioning.calibration.residuals_picture import draw_residuals
 from coneskin.core.errors import MissingExtra, RecordingError, SceneError
 from coneskin.core.picture_file import write_picture
 from coneskin.runs.replay.run_picture import draw_run
-from coneskin.runs.what_if.variant_picture import draw_variants
+from coneskin.runs.what_if.variants import draw_variants
 
 NOTHING: Any = SimpleNamespace(name="a scene")
 PICTURES: dict[str, Callable[[Path], None]] = {

@@ -12,8 +12,7 @@ from coneskin.runs.decisions import decide_again
 from coneskin.runs.export.export import export_run
 from coneskin.runs.replay.run import Run
 from coneskin.runs.run_files import summarise_run
-from coneskin.runs.what_if.batch import judge_runs
-from coneskin.runs.what_if.what_if import what_if
+from coneskin.runs.what_if.what_if import judge_runs, what_if
 from tests.runs.conftest import COLLISION
 
 WORK: dict[str, Callable[[Run, Path, Progress], object]] = {

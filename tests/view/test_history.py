@@ -11,8 +11,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
-from coneskin.view.contact_mark import FADING, ContactLog
-from coneskin.view.history import UNKNOWN, History, PhaseWords, _phase_after
+from coneskin.view.history import FADING, UNKNOWN, History, PhaseWords, _ContactLog, _phase_after
 from coneskin.view.panel import event_list, state_of, status, timeline
 from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.traces import _envelope, _plots
@@ -64,8 +63,8 @@ def touch(name: EventName, time: float, number: int = 1, **details: object) -> G
     return GuardEvent(name, time, {"number": number, **place, **details})
 
 
-def fed(events: Iterable[GuardEvent]) -> ContactLog:
-    log = ContactLog()
+def fed(events: Iterable[GuardEvent]) -> _ContactLog:
+    log = _ContactLog()
     for one in events:
         log.feed(one)
     return log

@@ -1,4 +1,4 @@
-"""Playback: what is shown when."""
+"""_Playback: what is shown when."""
 
 import math
 import random
@@ -6,11 +6,12 @@ from itertools import pairwise
 
 import pytest
 
-from coneskin.view.playback import DELAY, Playback, Playout
+from coneskin.view.live_page import _DELAY, _Playout
+from coneskin.view.run_page import _Playback
 
 
 def test_it_stands_until_it_is_played_and_then_goes_at_its_speed() -> None:
-    playback = Playback(2.0, 10.0)
+    playback = _Playback(2.0, 10.0)
     assert playback.poll(100.0) == 2.0
     playback.speed = 0.1
     playback.play(101.0)
@@ -20,7 +21,7 @@ def test_it_stands_until_it_is_played_and_then_goes_at_its_speed() -> None:
 
 
 def test_it_pauses_at_the_end_and_plays_again_from_the_beginning() -> None:
-    playback = Playback(0.0, 1.0)
+    playback = _Playback(0.0, 1.0)
     playback.play(0.0)
     assert playback.poll(5.0) == 1.0
     assert not playback.playing
@@ -29,7 +30,7 @@ def test_it_pauses_at_the_end_and_plays_again_from_the_beginning() -> None:
 
 
 def test_a_pause_takes_no_time_of_the_run() -> None:
-    playback = Playback(0.0, 10.0)
+    playback = _Playback(0.0, 10.0)
     playback.play(0.0)
     playback.poll(1.0)
     playback.pause()
@@ -40,7 +41,7 @@ def test_a_pause_takes_no_time_of_the_run() -> None:
 
 @pytest.mark.parametrize(("asked", "shown"), [(5.0, 5.0), (-3.0, 0.0), (99.0, 10.0), (math.nan, 4.0), (math.inf, 4.0)])
 def test_one_can_jump_to_what_there_is(asked: float, shown: float) -> None:
-    playback = Playback(0.0, 10.0)
+    playback = _Playback(0.0, 10.0)
     playback.show(4.0)
     playback.show(asked)
     assert playback.time == shown
@@ -53,7 +54,7 @@ RUN = 1000.0  # s by which the run's clock is ahead
 
 def shown(late: float, seconds: float = 4.0, offset: float = RUN) -> list[tuple[float, float, float]]:
     """Clock, newest and what is shown of a run whose parcels come up to so late [s]."""
-    playout, chance, found = Playout(), random.Random(1), []
+    playout, chance, found = _Playout(), random.Random(1), []
     parcels = [(k * PARCEL + late * chance.random(), offset + k * PARCEL) for k in range(round(seconds / PARCEL))]
     for picture in range(3, round(seconds / STEP)):
         now = picture * STEP
@@ -75,7 +76,7 @@ def test_parcels_become_even_steps() -> None:
 def test_what_is_shown_is_late_by_the_delay() -> None:
     """Of a run whose parcels come at once; the offset is seen at pictures, which fall a third of a step apart."""
     for now, _, at in shown(late=0.0)[30:]:
-        assert at == pytest.approx(now + RUN - DELAY, abs=STEP / 3.0)
+        assert at == pytest.approx(now + RUN - _DELAY, abs=STEP / 3.0)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.03, 0.2])
@@ -86,15 +87,15 @@ def test_it_is_never_ahead_and_never_runs_back(late: float) -> None:
 
 
 def test_a_run_that_ends_is_shown_to_its_end() -> None:
-    playout = Playout()
+    playout = _Playout()
     playout.time(RUN, 1.0)
-    assert playout.time(RUN, 1.0 + 0.5 * DELAY) < RUN
+    assert playout.time(RUN, 1.0 + 0.5 * _DELAY) < RUN
     assert playout.time(RUN, 2.0) == RUN
 
 
 def test_a_parcel_after_a_silence_is_caught_up_with() -> None:
     """A computer that slept: what came late once does not stay late."""
-    playout = Playout()
+    playout = _Playout()
     playout.time(RUN, 1.0)
     playout.time(RUN + 1.0, 5.0)  # came three seconds late
-    assert playout.time(RUN + 5.0, 6.0) == pytest.approx(RUN + 5.0 - DELAY)
+    assert playout.time(RUN + 5.0, 6.0) == pytest.approx(RUN + 5.0 - _DELAY)

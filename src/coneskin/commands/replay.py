@@ -175,8 +175,8 @@ def _replay_with_settings(args: argparse.Namespace) -> int:
 
 def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     """Replay many runs with each variant; return 0, 1 for a difference or an error, or 4 for a damaged run."""
-    from coneskin.runs.what_if.batch import judge_runs
-    from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
+    from coneskin.runs.what_if.variants import score_variants, variant_lines, write_rows
+    from coneskin.runs.what_if.what_if import judge_runs
 
     variants = _variants(args)
     if args.table is not None and args.table.suffix != ".parquet":
@@ -187,7 +187,7 @@ def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
     if args.table is not None:
         write_rows(args.table, rows)
     if args.picture is not None:
-        from coneskin.runs.what_if.variant_picture import draw_variants
+        from coneskin.runs.what_if.variants import draw_variants
 
         draw_variants(scores, args.picture)
     if args.json:

@@ -77,7 +77,7 @@ def _write_events(path: Path, events: Iterable[GuardEvent], start: float) -> Non
         write_whole(path, f'{{"events": [\n{lines}\n]}}\n')
 
 
-def golden_path(recording: Path) -> Path:
+def _golden_path(recording: Path) -> Path:
     """Return the file of a recording's golden events: ``run.events.json`` of ``run.rec``."""
     return recording.with_suffix(".events.json")
 
@@ -89,8 +89,13 @@ def check_golden(recording: Path, tolerances: Tolerances | None = None) -> Compa
         RecordingError: the recording cannot be read, is incomplete, or has no events; or the golden file is no such.
         SceneError: its scene cannot be read.
     """
-    recorded, again = _decide(recording)
-    golden = golden_path(recording)
+    return _compare_golden(recording, *_decide(recording), tolerances)
+
+
+def _compare_golden(
+    recording: Path, recorded: Decisions, again: Decisions, tolerances: Tolerances | None
+) -> Comparison:
+    golden = _golden_path(recording)
     if not golden.is_file():
         return compare_decisions(recorded, again, tolerances)
     events = _read_events(golden, recorded.start)
@@ -98,13 +103,14 @@ def check_golden(recording: Path, tolerances: Tolerances | None = None) -> Compa
     return compare_decisions(reviewed, without_invented(again, recorded), tolerances)
 
 
-def update_golden(recording: Path, tolerances: Tolerances | None = None) -> bool:
-    """Write today's events as the golden ones where they differ, and tell whether they did; errors as of the check."""
-    if check_golden(recording, tolerances).same:
-        return False
+def update_golden(recording: Path, tolerances: Tolerances | None = None) -> Path | None:
+    """Write today's events as the golden ones where they differ, and return that file; errors as of the check."""
     recorded, again = _decide(recording)
-    _write_events(golden_path(recording), without_invented(again, recorded).events, recorded.start)
-    return True
+    if _compare_golden(recording, recorded, again, tolerances).same:
+        return None
+    golden = _golden_path(recording)
+    _write_events(golden, without_invented(again, recorded).events, recorded.start)
+    return golden
 
 
 def _decide(recording: Path) -> tuple[Decisions, Decisions]:

@@ -96,12 +96,12 @@ class _RecordedRunItem(pytest.Item):
     def runtest(self) -> None:
         """Replay the run and compare."""
         from .comparison import comparison_lines
-        from .event_file import check_golden, golden_path, update_golden
+        from .event_file import check_golden, update_golden
 
         tolerances = _tolerances(self.config)
         if self.config.getoption("--coneskin-update"):
-            if update_golden(self.path, tolerances):
-                self.config.stash[_UPDATED_FILES].append(str(golden_path(self.path)))
+            if written := update_golden(self.path, tolerances):
+                self.config.stash[_UPDATED_FILES].append(str(written))
             return
         comparison = check_golden(self.path, tolerances)
         if not comparison.same:

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import ipaddress
 import json
+import queue
 import socket
+import threading
 from typing import Any
 from urllib.parse import urlsplit
 
-from coneskin.core.errors import SceneError
+from coneskin.core.errors import MissingExtra, SceneError
 from coneskin.core.text import finite
 from coneskin.robot.guard.signals.journal import GuardEvent
-
-from .mqtt_channel import MqttChannel
-from .zmq_channel import ZmqChannel
 
 _MAX_DATAGRAM = 8000  # bytes of a message; loopback and most networks carry them in one datagram
 _URL_FORMS = "udp://HOST:PORT, zmq://HOST:PORT or mqtt://HOST:PORT/TOPIC"
@@ -44,6 +43,102 @@ class _UdpChannel:
 
     def close(self) -> None:
         self._socket.close()
+
+
+_ZMQ_CLOSE_TIMEOUT = 200  # ms for the last events to leave
+
+
+class _ZmqChannel:
+    """A bound PUB socket; a message has two parts, the event's name, by which subscribers choose, and the JSON.
+
+    Raises:
+        SceneError: the address is taken, or not one of this computer.
+        MissingExtra: pyzmq is not installed.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        try:
+            import zmq
+        except ModuleNotFoundError as exc:
+            raise MissingExtra("pyzmq", "publishing by ZeroMQ", "zmq") from exc
+        self._context = zmq.Context()
+        self._socket = self._context.socket(zmq.PUB)
+        self._no_wait = zmq.NOBLOCK
+        self._socket.setsockopt(zmq.IPV6, ":" in host)
+        address = f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
+        try:
+            self._socket.bind(address)
+        except zmq.ZMQError as exc:
+            self._context.destroy(linger=0)
+            raise SceneError([f"cannot publish at {address}: {exc.strerror}; name another port"], "--publish") from exc
+
+    def send(self, name: str, data: bytes) -> None:
+        """Hand a message to the socket, which drops it where a subscriber is too slow.
+
+        Raises:
+            OSError: it is closed.
+        """
+        if self._socket.closed:
+            raise OSError("closed")
+        self._socket.send_multipart([name.encode(), data], self._no_wait)
+
+    def close(self) -> None:
+        """Close the socket; may be called again."""
+        self._context.destroy(linger=_ZMQ_CLOSE_TIMEOUT)
+
+
+_ANSWER_TIMEOUT = 5.0  # s for the broker to answer
+_MQTT_CLOSE_TIMEOUT = 0.5  # s for the last events to leave
+
+
+class _MqttChannel:
+    """A connection to a broker, made again where it is lost. An event's topic is ``topic`` and its name.
+
+    Raises:
+        SceneError: no broker answers, or it refuses.
+        MissingExtra: paho-mqtt is not installed.
+    """
+
+    def __init__(self, host: str, port: int, topic: str, user: str | None = None, password: str | None = None) -> None:
+        try:
+            from paho.mqtt.client import Client
+            from paho.mqtt.enums import CallbackAPIVersion
+        except ModuleNotFoundError as exc:
+            raise MissingExtra("paho-mqtt", "publishing by MQTT", "mqtt") from exc
+        answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # no callback holds this channel: no circle of references
+        ended = self._ended = threading.Event()
+        client = self._client = Client(CallbackAPIVersion.VERSION2)
+        client.on_connect = lambda *said: answers.put(str(said[3]) if said[3].is_failure else "")
+        client.on_disconnect = lambda *_: ended.set()
+        client.reconnect_delay_set(1, 10)
+        client.username_pw_set(user, password)
+        client.connect_timeout = _ANSWER_TIMEOUT
+        self._topic = topic
+        try:
+            client.connect(host, port)
+            client.loop_start()
+            refusal = answers.get(timeout=_ANSWER_TIMEOUT)
+        except (OSError, queue.Empty) as exc:
+            refusal = getattr(exc, "strerror", "") or str(exc) or "it does not answer"
+        if refusal:
+            self.close()
+            why = f"no MQTT broker takes events at {host}:{port}: {refusal}; start one there, such as mosquitto"
+            raise SceneError([why], "--publish")
+
+    def send(self, name: str, data: bytes) -> None:
+        """Hand a message to the thread of the connection.
+
+        Raises:
+            OSError: there is no connection.
+        """
+        if self._client.publish(f"{self._topic}/{name}", data).rc:
+            raise OSError("not connected")
+
+    def close(self) -> None:
+        """Close the connection; may be called again."""
+        self._ended.clear()
+        if self._client.disconnect() or self._ended.wait(_MQTT_CLOSE_TIMEOUT):
+            self._client.loop_stop()
 
 
 class EventPublisher:
@@ -81,13 +176,13 @@ class EventPublisher:
         if not beyond and not ipaddress.ip_address(address[0]).is_loopback:
             why = f"{host} is not this computer, and whoever is on its network could read the events; {_URL_EXAMPLE}"
             raise SceneError([f"{why}, or allow it with --publish-beyond"], "--publish")
-        self._channel: _UdpChannel | ZmqChannel | MqttChannel
+        self._channel: _UdpChannel | _ZmqChannel | _MqttChannel
         if parts.scheme == "udp":
             self._channel = _UdpChannel(family, address, beyond)
         elif parts.scheme == "zmq":
-            self._channel = ZmqChannel(str(address[0]), port)
+            self._channel = _ZmqChannel(str(address[0]), port)
         else:
-            self._channel = MqttChannel(host, port, topic or "coneskin", parts.username, parts.password)
+            self._channel = _MqttChannel(host, port, topic or "coneskin", parts.username, parts.password)
 
     def publish(self, event: GuardEvent, began: float) -> None:
         """Send an event, or drop it; times count from when the run began [s]. It never waits and never raises."""

@@ -14,7 +14,6 @@ from .stage.sheet_field import (
     ContactOnSheet,
     FieldPatches,
     SheetField,
-    field_patches,
     linear,
     potential_colours,
 )
@@ -68,7 +67,7 @@ class FieldChoice:
             for sheet in stage.sheets:
                 name = f"{root}/link {sheet.link}/potential of {stage.sheets.index(sheet)}"
                 if name not in self._fields:
-                    patches = field_patches(sheet)
+                    patches = FieldPatches.of(sheet)
                     self._fields[name] = SheetField(sheet.sensor, patches.u, patches.phi), patches
                 field, patches = self._fields[name]
                 contact = _contact_on(sheet, moment)

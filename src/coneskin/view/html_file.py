@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import RecordingError
-from coneskin.core.files import draft_of
+from coneskin.core.files import explain_os_error, write_whole
 
 from .page_server import PageServer, page_client
 from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline
@@ -144,11 +144,8 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     page = page.replace("</head>", f"{head}</head>", 1)
     at = page.rindex("</body>")
     page = page[:at] + _panel(courses, since, until, pictures) + page[at:]
-    try:
-        with draft_of(path, overwrite=True) as draft:
-            draft.write_text(page, encoding="utf-8")
-    except OSError as exc:
-        raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
+    with explain_os_error(RecordingError, f"cannot write {path}"):
+        write_whole(path, page)
     return count / duration
 
 
@@ -156,11 +153,8 @@ def _check_target(path: Path) -> None:
     """Refuse a file that is no page: a recording, perhaps, that was named by mistake."""
     if not path.is_file():
         return  # the writing says whether that is possible
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(_PAGE_BEGIN))
-    except OSError as exc:
-        raise RecordingError(f"cannot write {path}: {exc.strerror or exc}") from exc
+    with explain_os_error(RecordingError, f"cannot write {path}"), path.open("rb") as file:
+        start = file.read(len(_PAGE_BEGIN))
     if start and start.lower() != _PAGE_BEGIN:
         raise RecordingError(f"{path} exists already and is no page, so it is not replaced: name another file")
 

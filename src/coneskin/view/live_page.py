@@ -14,7 +14,6 @@ from .history import UNKNOWN
 from .live_run import LiveRun
 from .page_server import PageServer
 from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, stop_entries, timeline
-from .playback import Playout
 from .run_course import Moment, RunCourse
 from .stage.level_scale import level_bars
 from .stage.stage import Stage
@@ -32,6 +31,39 @@ _SEARCH_SILENCE = 1.0  # s without news after which a newer run is looked for
 _TIMELINE_SPAN = 20.0  # s of the timeline
 _MAX_LISTED_EVENTS = 200  # events that are put into words
 _AT_REST = '<div class="coneskin-card">No guard records a run: the arm is drawn at rest until one begins.</div>'
+
+
+_DELAY = 0.07  # s by which poses and bodies are late: a parcel of the recorder's, and the wait for the next
+_OFFSET_DRIFT = 0.01  # s for each second; by which the offset of the two clocks may shrink
+
+
+class _Playout:
+    """Playout of one run. Pure: the time is an argument.
+
+    A recorder hands over what it has every 50 ms, in which an arm moves in jerks. So the poses, and the bodies that the
+    arm meets, are shown a little late, by a clock that runs as evenly as the computer's own. What touches and what the
+    guard does is shown at once.
+
+    The offset of the run's clock from this computer's is the largest that was seen: of the parcel that was on its way
+    for the shortest time.
+    """
+
+    def __init__(self) -> None:
+        self._offset: float | None = None
+        self._looked = 0.0
+
+    def time(self, newest: float, now: float) -> float:
+        """Return the time of the run that is to be shown; it never runs back, and never ahead of what has come.
+
+        Args:
+            newest: time of the newest that has come, on the run's clock [s].
+            now: the clock [s].
+        """
+        offset = newest - now
+        if self._offset is not None:
+            offset = max(offset, self._offset - _OFFSET_DRIFT * (now - self._looked))
+        self._offset, self._looked = offset, now
+        return min(newest, now + offset - _DELAY)
 
 
 class LivePage:
@@ -152,7 +184,7 @@ class LivePage:
 
     def _stand(self, stage: Stage) -> None:
         """Draw a stage in the place of the one before."""
-        self._drawn, self._playout, self._newest_event = stage, Playout(), self
+        self._drawn, self._playout, self._newest_event = stage, _Playout(), self
         self._texted = self._plotted = -1e9
         scene, reach = self._server.scene, stage.reach
         with self._entering:

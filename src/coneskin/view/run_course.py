@@ -18,8 +18,7 @@ from .history import History
 from .stage.stage import Stage, set_stage
 
 if TYPE_CHECKING:
-    from .contact_mark import ContactMark
-    from .history import PhaseWords
+    from .history import ContactMark, PhaseWords
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,6 @@ from coneskin.robot.guard.signals.journal import EventName
 from .field_choice import FieldChoice
 from .page_server import PageServer
 from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, timeline
-from .playback import SPEEDS, Playback
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
@@ -23,7 +22,8 @@ from .traces import trace_drawings
 
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
-_SPEED_CHOICES = {f"{speed:g}x": speed for speed in SPEEDS}
+_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # times the recorded speed
+_SPEED_CHOICES = {f"{speed:g}x": speed for speed in _SPEEDS}
 _JUMP_EVENTS = frozenset(
     {EventName.CONTACT, EventName.STOPPING, EventName.STANDSTILL, EventName.RETREATING, EventName.RETREATED}
     | {EventName.LATCHED, EventName.FAULT, EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.STOP_FAILED}
@@ -38,6 +38,62 @@ def show_runs(server: PageServer, courses: Sequence[RunCourse]) -> None:
     server.on_viewer(lambda client: _Player(client, courses).end)
 
 
+class _Playback:
+    """Playback of a stretch of time. Pure: the time is an argument.
+
+    Args:
+        since: where it begins [s].
+        until: where it ends.
+
+    Attributes:
+        time: that is shown [s].
+        playing: it goes on by itself.
+        speed: times the recorded one.
+    """
+
+    def __init__(self, since: float, until: float) -> None:
+        self.since, self.until = since, until
+        self.time = since
+        self.playing = False
+        self.speed = 1.0
+        self._then: float | None = None
+
+    def play(self, now: float) -> None:
+        """Go on from here; from the beginning where the end is shown.
+
+        Args:
+            now: the clock [s].
+        """
+        if self.time >= self.until:
+            self.time = self.since
+        self.playing, self._then = True, now
+
+    def pause(self) -> None:
+        """Stay where it is."""
+        self.playing, self._then = False, None
+
+    def show(self, time: float) -> None:
+        """Stand at a time [s], or the nearest that there is; nonsense is not followed."""
+        self.pause()
+        if math.isfinite(time):
+            self.time = min(max(time, self.since), self.until)
+
+    def poll(self, now: float) -> float:
+        """Go on by what has passed since the last call, and return the time that is shown [s].
+
+        Args:
+            now: the clock [s].
+        """
+        if self.playing:
+            if self._then is not None and now > self._then:
+                self.time += self.speed * (now - self._then)
+            self._then = now
+            if self.time >= self.until:
+                self.time = self.until
+                self.pause()
+        return self.time
+
+
 class _Player:
     """Player of one viewer: a thread of its own that moves the scene; its panel only sets what the thread reads.
 
@@ -49,7 +105,7 @@ class _Player:
     def __init__(self, client: Any, courses: Sequence[RunCourse]) -> None:
         self._client, self._strands = client, courses
         spans = [course.span for course in courses]
-        self._playback = Playback(_down(min(since for since, _ in spans)), -_down(-max(until for _, until in spans)))
+        self._playback = _Playback(_down(min(since for since, _ in spans)), -_down(-max(until for _, until in spans)))
         self._changed = threading.Condition()
         self._over = False
         self._nodes = [
@@ -106,7 +162,7 @@ class _Player:
 
     def _pressed(self, _event: Any) -> None:
         what, now = self._buttons.value, time.monotonic()
-        actions: dict[str, Callable[[Playback], object]] = {
+        actions: dict[str, Callable[[_Playback], object]] = {
             "play": lambda playback: playback.play(now),
             "pause": lambda playback: playback.pause(),
             "|<": lambda playback: playback.show(playback.since),
@@ -126,14 +182,14 @@ class _Player:
         if event.client is not None and head.isdecimal() and int(head) < len(self._times):
             self._do(lambda playback: playback.show(self._times[int(head)]))
 
-    def _step(self, playback: Playback, way: int) -> None:
+    def _step(self, playback: _Playback, way: int) -> None:
         """Go to the next event that matters, or to the one before."""
         times = [self._times[index] for index in self._jumps]
         ahead = [at for at in times if (at - playback.time) * way > 1e-4]
         if ahead:
             playback.show(min(ahead) if way > 0 else max(ahead))
 
-    def _do(self, action: Callable[[Playback], object]) -> None:
+    def _do(self, action: Callable[[_Playback], object]) -> None:
         with self._changed:
             action(self._playback)
             self._changed.notify()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.geometry.pose import Pose, Vector
 
 from .stage.level_scale import SHEET_COLOURS, level_colour
-from .stage.solids import along, joined, quaternion, revolve
+from .stage.solids import joined, revolve
 from .stage.stage import floor_lines
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
     from coneskin.geometry.placed_frustum import PlacedFrustum
 
-    from .contact_mark import ContactMark
+    from .history import ContactMark
     from .page_server import PageServer
     from .run_course import Moment
     from .stage.solids import Solid
@@ -110,7 +110,7 @@ class StageNodes:
         for link, frame in self._frames.items():
             if (pose := moment.poses[link]) != self._poses.get(link):
                 self._poses[link] = pose
-                frame.wxyz, frame.position = quaternion(pose), pose.translation
+                frame.wxyz, frame.position = pose.quaternion, pose.translation
         for frame, moved in zip(self._bodies, moment.bodies, strict=True):
             frame.position = moved
         for sheet in self._stage.sheets:
@@ -153,7 +153,7 @@ class _MarkNodes:
         colour = _PAST if strength < 1.0 else LOCATED if mark.located else _UNCERTAIN
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         arrow, faces = _arrow()
-        there = Pose.trusted(along(mark.normal).rotation, mark.point)
+        there = Pose.along(mark.normal, mark.point)
         _add_mesh(
             self._scene, f"{self._name}/normal", _single(there.apply_all(arrow.astype(float))), faces, colour, shade
         )

@@ -15,9 +15,8 @@ import pytest
 from coneskin.core.errors import RecordingError
 from coneskin.runs.comparison import comparison_lines
 from coneskin.runs.replay.run import Run
-from coneskin.runs.what_if.batch import judge_runs
-from coneskin.runs.what_if.variant_table import score_variants, variant_lines, write_rows
-from coneskin.runs.what_if.what_if import judge_run, what_if
+from coneskin.runs.what_if.variants import score_variants, variant_lines, write_rows
+from coneskin.runs.what_if.what_if import judge_run, judge_runs, what_if
 
 from ..conftest import COLLISION
 
@@ -99,7 +98,7 @@ import distributed
 
 from coneskin.core.errors import RecordingError
 from coneskin.runs.what_if import batch
-from coneskin.runs.what_if.batch import judge_runs
+from coneskin.runs.what_if.what_if import judge_runs
 
 if __name__ == "__main__":
     paths, variants = [Path(word) for word in sys.argv[2:]], json.loads(sys.argv[1])

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.runs.what_if.variant_picture import draw_variants
-from coneskin.runs.what_if.variant_table import VariantScore, score_variants, shared_settings, variant_lines
+from coneskin.runs.what_if.variants import VariantScore, _shared_settings, draw_variants, score_variants, variant_lines
 
 
 def test_each_variant_is_a_point_with_its_name(tmp_path: Path) -> None:
@@ -53,9 +52,9 @@ def test_variants_at_one_point_do_not_lie_on_each_other(tmp_path: Path) -> None:
 
 def test_what_all_variants_share_is_said_once() -> None:
     names = ["a.b=1, c.d=2", "a.b=1, c.d=3", "a.b=1"]
-    assert shared_settings(names) == (["a.b=1"], ["c.d=2", "c.d=3", "without more"])
-    assert shared_settings(names[:1]) == ([], names[:1])
-    assert shared_settings([]) == ([], [])
+    assert _shared_settings(names) == (["a.b=1"], ["c.d=2", "c.d=3", "without more"])
+    assert _shared_settings(names[:1]) == ([], names[:1])
+    assert _shared_settings([]) == ([], [])
     lines = variant_lines([VariantScore(name, 9, 0, 1, 20, 0, 3, 0, 0.002, 0.004, 1.0) for name in names])
     assert lines[0] == "all with a.b=1"
     assert [line.split("  ")[0] for line in lines[2:]] == ["c.d=2", "c.d=3", "without more"]

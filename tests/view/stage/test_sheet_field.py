@@ -13,12 +13,12 @@ from coneskin.view.stage.sheet_field import (
     PHASES,
     SQUARE,
     ContactOnSheet,
+    FieldPatches,
     SheetField,
-    field_patches,
     linear,
     potential_colours,
 )
-from coneskin.view.stage.sheet_surface import sheet_surfaces
+from coneskin.view.stage.sheet_surface import SheetSurface
 from tests.scene.scenes import DOUBLE_CONE
 from tests.support.paths import COLLISION
 from tests.view.browser import rotation
@@ -91,8 +91,9 @@ def test_the_same_contact_is_not_solved_twice(sensor: Sensor) -> None:
 
 def test_the_corners_of_the_patches_lie_above_the_sheet_and_cover_it() -> None:
     scene = parse_scene(DOUBLE_CONE, "scene.toml")
-    for sheet in sheet_surfaces(place_on_arm(scene), [item.sensor for item in scene.sensors]):
-        patches = field_patches(sheet)
+    for item, placed in zip(place_on_arm(scene), scene.sensors, strict=True):
+        sheet = SheetSurface.of(item, placed.sensor)
+        patches = FieldPatches.of(sheet)
         square = np.array(SQUARE[0])
         turns = np.array([rotation(wxyz) for wxyz in patches.rotations])
         corners = np.einsum("nij,nkj->nki", turns, square * patches.sizes[:, None, :]) + patches.positions[:, None, :]

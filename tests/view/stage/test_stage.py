@@ -16,7 +16,7 @@ from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.testing.scenes import forearm_scene
 from coneskin.view.stage.level_scale import level_colour
-from coneskin.view.stage.solids import Solid, along, arm_solids, barrel, joined, quaternion
+from coneskin.view.stage.solids import Solid, arm_solids, barrel, joined
 from coneskin.view.stage.stage import CLEAR, Stage, _clear_where_buried, floor_lines, set_stage
 from tests.scene.scenes import DOUBLE_CONE
 
@@ -164,10 +164,10 @@ def test_the_floor_has_a_line_every_quarter_of_a_metre(reach: float) -> None:
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, -0.48, 0.64)])
 def test_an_arrow_points_along_its_normal(normal: tuple[float, float, float]) -> None:
-    pose = along(normal)
+    pose = Pose.along(normal)
     Pose(pose.rotation)  # is a rotation
     assert pose.rotate((0.0, 0.0, 1.0)) == pytest.approx(normal)
-    w, x, y, z = quaternion(pose)
+    w, x, y, z = pose.quaternion
     turned = (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
     assert turned == pytest.approx(normal)
 
@@ -175,7 +175,7 @@ def test_an_arrow_points_along_its_normal(normal: tuple[float, float, float]) ->
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (3.0, 0.1, 0.2), (0.1, 3.1, 0.0), (0.2, 0.1, 3.1), (1.0, -1.0, 2.0)])
 def test_a_quaternion_turns_as_its_pose(rpy: tuple[float, float, float]) -> None:
     pose = Pose.from_xyz_rpy(rpy=rpy)
-    w, x, y, z = quaternion(pose)
+    w, x, y, z = pose.quaternion
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),

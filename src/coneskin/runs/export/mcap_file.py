@@ -25,8 +25,6 @@ from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
 from coneskin.skin.detection.frame.reading import read
 
-from .tables import wall_clock
-
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.driver.values import ControllerState
@@ -66,7 +64,7 @@ def write_mcap(run: Run, path: Path, progress: Progress = silent) -> int:
         raise MissingExtra("mcap", "an MCAP file", "mcap") from exc
     messages = merge(*_streams(run, progress), key=lambda message: message.time)
     number = -1
-    unix = wall_clock(run)
+    unix = run.unix_offset
     with path.open("xb") as file:
         writer = Writer(file)
         writer.start(profile="", library="coneskin")
@@ -89,7 +87,7 @@ def write_mcap(run: Run, path: Path, progress: Progress = silent) -> int:
 
 def _streams(run: Run, progress: Progress) -> list[Iterable[_Message]]:
     """Return the messages of each kind in the order of time, read from the run one after the other."""
-    unix, events = wall_clock(run), sorted(run.events, key=lambda event: event.time)
+    unix, events = run.unix_offset, sorted(run.events, key=lambda event: event.time)
     logs = [_Message("/events", "foxglove.Log", event.time, _log(event, run, unix)) for event in events]
     streams: list[Iterable[_Message]] = [
         logs,

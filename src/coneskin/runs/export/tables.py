@@ -12,7 +12,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.progress import Progress, silent
-from coneskin.core.recording.block import is_time
 from coneskin.robot.arm.models import JOINT_COUNT
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
@@ -53,20 +52,13 @@ def _pieces(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> Iterator[T
         yield dict(zip(columns, map(list, zip(*piece, strict=True)), strict=True))
 
 
-def wall_clock(run: Run) -> float:
-    """Return what turns a host time of the run into seconds since 1970; 0 where the recording does not tell."""
-    clocks = run.header["clocks"]
-    unix = clocks.get("unix")
-    return unix - clocks["monotonic"] if is_time(unix) else 0.0
-
-
 def _events(run: Run, start: float) -> Iterator[Table]:
     events = run.events
     if not events:
         return
     table: dict[str, list[Any]] = {
         "time_s": [event.time - start for event in events],
-        "unix_s": [event.time + wall_clock(run) for event in events],
+        "unix_s": [event.time + run.unix_offset for event in events],
         "event": [event.name.value for event in events],
     }
     for name in dict.fromkeys(key for event in events for key in event.details):

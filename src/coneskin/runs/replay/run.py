@@ -164,6 +164,12 @@ class Run:
         return start
 
     @property
+    def unix_offset(self) -> float:
+        """What turns a host time of the run into seconds since 1970 [s]; 0 where the recording does not tell."""
+        unix = self.header["clocks"].get("unix")
+        return unix - self.start if is_time(unix) else 0.0
+
+    @property
     def complete(self) -> bool:
         """True where nothing is missing and nothing is out of place."""
         return not self.defects

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.geometry.pose import Pose
 
-from .solids import quaternion
-
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -155,33 +153,32 @@ class FieldPatches(NamedTuple):
     rotations: NDArray[np.float32]
     sizes: NDArray[np.float32]
 
+    @classmethod
+    def of(cls, sheet: SheetSurface) -> FieldPatches:
+        """Return the patches of a sheet."""
+        import numpy as np
 
-def field_patches(sheet: SheetSurface) -> FieldPatches:
-    """Return the patches of a sheet."""
-    import numpy as np
-
-    placed = sheet.item.frustum
-    cone = placed.frustum
-    edges_u, edges_phi = np.linspace(0.0, cone.slant, _ROWS + 1), np.linspace(0.0, cone.wrap, _COLUMNS + 1)
-    rows, columns = np.meshgrid(
-        0.5 * (edges_u[:-1] + edges_u[1:]), 0.5 * (edges_phi[:-1] + edges_phi[1:]), indexing="ij"
-    )
-    u, phi = rows.ravel(), columns.ravel()
-    points, normals = placed.place(u, phi)
-    if sheet.item.surface is not None:
-        points = np.array([sheet.item.surface.point(a, b) for a, b in zip(u.tolist(), phi.tolist(), strict=True)])
-    points = points + _PATCH_HEIGHT * normals
-    step = 1e-4 * cone.slant
-    along = placed.place(u + step, phi)[0] - placed.place(u - step, phi)[0]
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    around = np.cross(along, normals)
-    turned = []
-    for (x0, x1, x2), (y0, y1, y2), (z0, z1, z2) in zip(around.tolist(), along.tolist(), normals.tolist(), strict=True):
-        turned.append(quaternion(Pose.trusted(((x0, y0, z0), (x1, y1, z1), (x2, y2, z2)), (0.0, 0.0, 0.0))))
-    radius = cone.radius1 + (cone.radius2 - cone.radius1) * u / cone.slant + _PATCH_HEIGHT
-    widths = 2.0 * radius * math.tan(0.5 * cone.wrap / _COLUMNS) * _PATCH_OVERLAP
-    sizes = np.column_stack([widths, np.full_like(u, _PATCH_OVERLAP * cone.slant / _ROWS), np.ones_like(u)])
-    return FieldPatches(u, phi, points.astype("float32"), np.array(turned, dtype="float32"), sizes.astype("float32"))
+        placed = sheet.item.frustum
+        cone = placed.frustum
+        edges_u, edges_phi = np.linspace(0.0, cone.slant, _ROWS + 1), np.linspace(0.0, cone.wrap, _COLUMNS + 1)
+        rows, columns = np.meshgrid(
+            0.5 * (edges_u[:-1] + edges_u[1:]), 0.5 * (edges_phi[:-1] + edges_phi[1:]), indexing="ij"
+        )
+        u, phi = rows.ravel(), columns.ravel()
+        points, normals = placed.place(u, phi)
+        if sheet.item.surface is not None:
+            points = np.array([sheet.item.surface.point(a, b) for a, b in zip(u.tolist(), phi.tolist(), strict=True)])
+        points = points + _PATCH_HEIGHT * normals
+        step = 1e-4 * cone.slant
+        along = placed.place(u + step, phi)[0] - placed.place(u - step, phi)[0]
+        along /= np.linalg.norm(along, axis=1)[:, None]
+        around = np.cross(along, normals)
+        rotations = np.stack([around, along, normals], axis=2).tolist()
+        turned = [Pose.trusted(rows, (0.0, 0.0, 0.0)).quaternion for rows in rotations]
+        radius = cone.radius1 + (cone.radius2 - cone.radius1) * u / cone.slant + _PATCH_HEIGHT
+        widths = 2.0 * radius * math.tan(0.5 * cone.wrap / _COLUMNS) * _PATCH_OVERLAP
+        sizes = np.column_stack([widths, np.full_like(u, _PATCH_OVERLAP * cone.slant / _ROWS), np.ones_like(u)])
+        return cls(u, phi, points.astype("float32"), np.array(turned, dtype="float32"), sizes.astype("float32"))
 
 
 def potential_colours(volts: Floats, low: float, high: float) -> NDArray[np.uint8]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -47,48 +46,39 @@ class SheetSurface(NamedTuple):
     sensor: Sensor
     item: SensorOnArm
 
+    @classmethod
+    def of(cls, item: SensorOnArm, sensor: Sensor) -> SheetSurface:
+        """Return the active area of a sensor at its place on the arm, in the DH frame of its link."""
+        import numpy as np
 
-def sheet_surfaces(placed: Sequence[SensorOnArm], sensors: Sequence[Sensor]) -> tuple[SheetSurface, ...]:
-    """Return the active areas of sensors, each in the DH frame of its link.
-
-    Args:
-        placed: the sensors on the arm.
-        sensors: the same ones.
-    """
-    return tuple(_surface(item, sensor) for item, sensor in zip(placed, sensors, strict=True))
-
-
-def _surface(item: SensorOnArm, sensor: Sensor) -> SheetSurface:
-    import numpy as np
-
-    cone = item.frustum.frustum
-    largest = max(cone.radius1, cone.radius2)
-    straight = item.surface is None  # a mesh lies below another sheet, and is not quite a cone
-    u = np.linspace(0.0, cone.slant, 2 if straight else _count(cone.slant / _VERTEX_DISTANCE, 8))
-    step = 2.0 * math.acos(1.0 - min(_MAX_SAGITTA / largest, 1.0)) if straight else _VERTEX_DISTANCE / largest
-    phi = np.linspace(0.0, cone.wrap, _count(cone.wrap / step, 24))
-    vertices, faces = _strip(item, u, phi, _SHEET_HEIGHT)
-    width, turn = min(_RIM_WIDTH, cone.slant), min(_RIM_WIDTH / largest, cone.wrap)
-    bands = [(u[[0]] + (0.0, width), phi), (u[[-1]] - (width, 0.0), phi)]
-    bands += [(u, phi[[0]] + (0.0, turn)), (u, phi[[-1]] - (turn, 0.0))]
-    rim_vertices, rim_faces, before = [], [], 0
-    for along, around in bands:
-        points, triangles = _strip(item, along, around, _SHEET_HEIGHT + _RIM_ABOVE)
-        rim_vertices.append(points)
-        rim_faces.append(before + triangles)
-        before += len(points)
-    return SheetSurface(
-        item.name,
-        item.link,
-        vertices,
-        faces,
-        np.concatenate(rim_vertices),
-        np.concatenate(rim_faces),
-        sensor.thresholds.touch_level,
-        0.97 * min(cone.radius1, cone.radius2),
-        sensor,
-        item,
-    )
+        cone = item.frustum.frustum
+        largest = max(cone.radius1, cone.radius2)
+        straight = item.surface is None  # a mesh lies below another sheet, and is not quite a cone
+        u = np.linspace(0.0, cone.slant, 2 if straight else _count(cone.slant / _VERTEX_DISTANCE, 8))
+        step = 2.0 * math.acos(1.0 - min(_MAX_SAGITTA / largest, 1.0)) if straight else _VERTEX_DISTANCE / largest
+        phi = np.linspace(0.0, cone.wrap, _count(cone.wrap / step, 24))
+        vertices, faces = _strip(item, u, phi, _SHEET_HEIGHT)
+        width, turn = min(_RIM_WIDTH, cone.slant), min(_RIM_WIDTH / largest, cone.wrap)
+        bands = [(u[[0]] + (0.0, width), phi), (u[[-1]] - (width, 0.0), phi)]
+        bands += [(u, phi[[0]] + (0.0, turn)), (u, phi[[-1]] - (turn, 0.0))]
+        rim_vertices, rim_faces, before = [], [], 0
+        for along, around in bands:
+            points, triangles = _strip(item, along, around, _SHEET_HEIGHT + _RIM_ABOVE)
+            rim_vertices.append(points)
+            rim_faces.append(before + triangles)
+            before += len(points)
+        return cls(
+            item.name,
+            item.link,
+            vertices,
+            faces,
+            np.concatenate(rim_vertices),
+            np.concatenate(rim_faces),
+            sensor.thresholds.touch_level,
+            0.97 * min(cone.radius1, cone.radius2),
+            sensor,
+            item,
+        )
 
 
 def _strip(item: SensorOnArm, u: Floats, phi: Floats, above: float) -> tuple[Floats, Ints]:

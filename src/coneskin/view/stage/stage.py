@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.geometry.pose import Pose, Vector
 
-from .sheet_surface import SheetSurface, sheet_surfaces
+from .sheet_surface import SheetSurface
 from .solids import Solid, body_solids
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
         KinematicsError: nobody knows where the tubes of the arm are.
         MeshError: a mesh cannot be read.
     """
-    sheets = sheet_surfaces(placed, [item.sensor for item in scene.sensors])
+    sheets = tuple(SheetSurface.of(*pair) for pair in zip(placed, (one.sensor for one in scene.sensors), strict=True))
     bodies, starts = tuple(body_solids(scene.bodies)), tuple(place for body in scene.bodies for place in body.parts)
     if scene.arm is None:
         return Stage(title, None, (), sheets, bodies, starts)
