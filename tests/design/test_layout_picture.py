@@ -21,11 +21,11 @@ def test_dimensions_have_units_and_lines_a_legend() -> None:
     words = "\n".join(text.get_text() for text in axes.texts)
     numbers = re.findall(r"\d+\.\d+(?! *(?:mm|cm2|deg))\b(?!\d)", words)
     assert numbers == []
-    assert len(re.findall(r"\d mm", words)) == 9  # both sides, the slant, two arcs, two radii, tie and connector
-    assert re.search(r"cable tie, (2[4-9]|3[0-6]) mm from the rim", words)
-    assert re.search(r"connector, (5[4-9]|6[0-6]) mm from the rim", words)
+    assert len(re.findall(r"\d mm", words)) == 7  # both sides, the slant, two arcs, two radii
     (legend,) = figure.legends
     named = {text.get_text() for text in legend.texts}
+    assert any(re.fullmatch(r"cable tie, (2[4-9]|3[0-6]) mm from the rim", name) for name in named)
+    assert any(re.fullmatch(r"connector, (5[4-9]|6[0-6]) mm from the rim", name) for name in named)
     assert {"upper conductive layer", "lower conductive layer", "substrates and isolation", "active area"} < named
     lines = [line for line in legend.get_lines() if line.get_marker() in ("", "None")]
     assert {line.get_linestyle() for line in lines} == {"-", "--", ":"}
@@ -54,22 +54,3 @@ def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str,
     assert crossing == (wrap_deg > 200.0)
     rim = [y for line in axes.lines[:1] for y in line.get_ydata()]
     assert cy < min(rim) if wires == "end1" else cy > min(rim)
-
-
-@pytest.mark.parametrize("length", [0.1, 0.6])
-def test_tie_and_connector_are_named_beside_their_marks(length: float) -> None:
-    """At any scale of the picture: a distance in mm was right for small sheets only."""
-    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
-    figure = module.Figure((9.0, 8.0))
-    (design,) = design_sheets((PlacedFrustum(Frustum(0.05, 0.05, length)),), DesignOptions())
-    draw_layout(figure, design, _sheet_wires(design.layout, design.way))
-    (axes,) = figure.axes
-    figure.draw_without_rendering()
-    marks = [line for line in axes.lines if line.get_marker() in "sD" and len(line.get_xdata()) == 1]
-    labels = [text for text in axes.texts if text.get_text().endswith("from the rim")]
-    assert len(marks) == len(labels) == 2
-    for mark, label in zip(marks, labels, strict=True):
-        (x, _) = axes.transData.transform((mark.get_xdata()[0], mark.get_ydata()[0]))
-        half = 0.5 * mark.get_markersize() * figure.dpi / 72.0
-        gap = x - half - label.get_window_extent().x1
-        assert 0.0 < gap * 72.0 / figure.dpi < 8.0

@@ -15,7 +15,7 @@ from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
 from .link_picture import draw_jig, draw_link, draw_weights
-from .sheet_pictures import draw_layout, draw_stack
+from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
 
@@ -89,6 +89,9 @@ def draw_pictures(
         progress(f"{design.name}: drawing how it is built")
         caption = f"{title}: its seven parts in the order of assembly, each seen from outside."
         picture(f"{name}-stack", (9, 7), caption, draw_stack, design)
+        where = "seam" if design.has_seam else "two edges, which do not meet"
+        picture(f"{name}-seam", (9, 3.8), f"{title}: section of its {where}, thickness enlarged.", draw_seam, design)
+        picture(f"{name}-parts", (9, 10), f"{title}: its parts as they are cut.", draw_parts, design)
         if item.collars:
             progress(f"{design.name}: drawing the jig")
             caption = f"{title}: parts of its jig as they are printed, a little apart."

@@ -1,6 +1,6 @@
 """Pictures of one sheet for the report, with the dimensions that a ruler measures.
 
-They show its flat layout, and its parts pulled apart in their order.
+They show its flat layout, its parts as they are cut and pulled apart in their order, and a section of its seam.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from coneskin.geometry.drawing.cut_sheet import CutSheet
+from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.outline import Outline
-from coneskin.geometry.drawing.surface_shape import ShapeCorner, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape, draw_hole, draw_shape, drawing_point
 from coneskin.geometry.sector import unroll
 
 from .sheets.sheet_design import SheetDesign
@@ -93,24 +93,19 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Any, wires: Sequence[Sheet
             edge = cone.wrap if wire.phi > target[1] else 0.0
             axes.plot(*zip(at(wire.u, wire.phi), at(*beyond), at(beyond[0], edge), strict=True), **style)
             word = "across\nthe seam" if design.has_seam else "around\nthe link"
-            x, y = at(wire.u + 2.5 * off[0] * tab, wire.phi)
+            x, y = at(wire.u + 3.5 * off[0] * tab, wire.phi)
             axes.text(x, y, f"{name}, {word}", fontsize=7, ha="center", va="center")
             continue
         run = [at(*(beyond[i] + (target[i] - beyond[i]) * k / 24.0 for i in range(2))) for k in range(25)]
         axes.plot(*zip(at(wire.u, wire.phi), *run, strict=True), **style)
-    if design.has_seam and not ends:
-        return  # the cable stands up from the seam
     led = [at(float(u), float(phi) - turned) for u, phi in way.surface]
     axes.plot(*zip(*led, strict=True), color=INK_COLOUR, lw=2.5)
     for index, marker, word, length in (
         (way.tie, "s", "cable tie", way.tie_length),
         (-1, "D", "connector", way.connector_length),
     ):
-        x, y = led[index]
-        axes.plot([x], [y], marker, color=INK_COLOUR, ms=6)
         label = f"{word}, {1e3 * length:.0f} mm from the rim"
-        style = {"fontsize": 8, "ha": "right", "va": "center"}
-        axes.annotate(label, (x, y), (-8.0, 0.0), textcoords="offset points", **style)  # beside the mark at any scale
+        axes.plot(*zip(led[index], strict=True), marker, color=INK_COLOUR, ms=6, ls="", label=label)
 
 
 def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
@@ -157,6 +152,98 @@ def _electrode_names(design: SheetDesign, cut: CutSheet) -> list[tuple[str, floa
         x, y = drawing_point(cone, *design.layout.electrode_middle(name, 0.5 * cone.slant, 0.42 * cone.wrap))
         found.append((name, 1e3 * way * x, 1e3 * y))
     return found
+
+
+def draw_parts(figure: Any, design: SheetDesign) -> None:
+    """Draw the seven cut sheets with their dimensions in mm, each with the face up that its drawing has up.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+    """
+    grid = figure.subplots(4, 2)
+    for axes in grid.flat:
+        axes.axis("off")
+    for axes, cut in zip(grid.flat, design.cuts, strict=False):
+        for stroke in (stroke for part in cut.parts for stroke in part.strokes):
+            axes.plot(*_xy(stroke.outline, 1e-4), color=[c / 255.0 for c in LINE_COLOURS[stroke.kind]], lw=0.7)
+        for name, x, y in _electrode_names(design, cut):
+            axes.text(x, y, name, fontsize=7, ha="center", va="center", bbox=_NAME_BOX)
+        x0, y0, x1, y1 = (1e3 * value for value in cut.bounds)
+        flat = unroll(cut.surface)
+        title = f"{cut.number} {cut.name}, {cut.face} up: {x1 - x0:.1f} mm wide, {y1 - y0:.1f} mm deep\n"
+        title += f"slant {1e3 * flat.slant:.1f} mm, arcs {1e3 * flat.arc1:.1f} mm (end 1), {1e3 * flat.arc2:.1f} mm"
+        axes.set_title(title, fontsize=8)
+        axes.set_aspect("equal")
+    words = "sizes with tabs and flap\nred cut, magenta hole, blue mark, green fold"
+    grid.flat[7].text(0.5, 0.5, words, ha="center", fontsize=9, transform=grid.flat[7].transAxes)
+
+
+_LAYER_COLOURS = ("#e8d9c0", "#55585e", "#cfe3f1", "#55585e", "#e8d9c0")
+
+
+def draw_seam(figure: Any, design: SheetDesign) -> None:
+    """Draw a section across the two edges of a sheet at its middle, thickness enlarged, as it is seen from end 1.
+
+    Args:
+        figure: an empty figure of matplotlib.
+        design: the sheet.
+    """
+    axes, layout, stack, wrap = figure.add_subplot(), design.layout, design.options.stack, design.place.frustum.wrap
+    u = 0.5 * design.place.frustum.slant
+    arc = 1e3 * design.place.frustum.radius_at(u)
+    edges = layout.active.phi1 * arc, (wrap - layout.active.phi2) * arc
+    reach, bare = 1.5 * max(edges), (math.tau - wrap) * arc
+    gap = min(bare, 0.4 * reach)  # a wider one is drawn as wide
+    heights = [0.3 * reach * stack.face_offset(index) / stack.thickness for index in range(6)]
+    foil = 0.012 * reach
+
+    def fill(shape: SurfaceShape, low: float, high: float, colour: str) -> list[float]:
+        """Fill the shape where the section meets it, and return the middles of what is drawn."""
+        corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
+        pairs = [(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True) if (a.u > u) != (b.u > u)]
+        met = sorted(a.phi + (b.phi - a.phi) * (u - a.u) / (b.u - a.u) for a, b in pairs)
+        drawn = []
+        for first, last in zip(met[::2], met[1::2], strict=True):
+            right = first * arc, min(last * arc, reach)
+            left = max((first - wrap) * arc, -reach) - gap, (last - wrap) * arc - gap
+            for start, end in (right, left):
+                if start < end:
+                    axes.fill_between([start, end], low, high, facecolor=colour, edgecolor=INK_COLOUR, lw=0.5)
+                    drawn.append(0.5 * (start + end))
+        return drawn
+
+    axes.fill_between([-reach - gap, reach], -0.1 * reach, 0.0, color="#c4c8ce")
+    axes.text(-0.5 * gap, -0.05 * reach, "link", ha="center", va="center", fontsize=9)
+    for index, (layer, colour) in enumerate(zip(stack.layers, _LAYER_COLOURS, strict=True)):
+        low, high = heights[index], max(heights[index + 1], heights[index] + foil)  # a thin sheet stays visible
+        fill({1: layout.lower, 3: layout.upper}.get(index, layout.rim), low, high, colour)
+        text = f"{layer.name}, {1e3 * layer.thickness:g} mm"
+        axes.text(1.03 * reach, 0.5 * (low + high) + (index - 2) * foil, text, fontsize=8, va="center")
+    for name, shape in layout.foils.items():
+        low, beside = (heights[2], 0.5 * heights[1]) if name in "CD" else (heights[3] - foil, 0.5 * sum(heights[4:]))
+        for x in fill(shape, low, low + foil, FOIL_COLOUR):
+            text = name if name in "CD" else f"lead of {name}"
+            axes.text(x, beside, text, ha="center", va="center", fontweight="bold")
+    top, red = 1.15 * heights[5], "#b00020"
+    axes.plot([0.0], [1.2 * top], lw=0)  # arrows and text do not extend the axes
+    arrow = {"arrowstyle": "<->", "color": red, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (-gap - edges[1], top), (edges[0], top), arrowprops=arrow)
+    blind = sum(edges) + bare
+    text = f"no touch is located here: {blind:.1f} mm, {math.degrees(blind / arc):.1f} deg"
+    axes.text(0.5 * (edges[0] - edges[1] - gap), 1.05 * top, text, ha="center", fontsize=9, color=red)
+    for x, text in ((0.6 * reach, "edge 0"), (-0.6 * reach - gap, "edge of C")):
+        axes.text(x, -0.13 * reach, text, ha="center", va="top", fontsize=9)
+    if bare > gap:
+        axes.text(
+            -0.5 * gap, 0.5 * heights[5], f"{bare:.0f} mm bare", rotation=90, ha="center", va="center", fontsize=8
+        )
+    if design.options.overlap:
+        flap = 1e3 * design.options.overlap
+        axes.plot([-gap, flap], [heights[5] + 2.0 * foil] * 2, color="#a07840", lw=3)
+        axes.text(flap, heights[5] + 2.0 * foil, f" flap {flap:g} mm", fontsize=8, va="center")
+    axes.margins(0.1)
+    axes.axis("off")
 
 
 _PART_ORDER = (1, 3, 2, 4, 6, 5, 7)  # numbers of the parts, from the link outwards

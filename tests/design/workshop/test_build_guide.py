@@ -56,7 +56,7 @@ def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) ->
     from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 
     stack = replace(PAPER_STACK, assembly=assembly)  # type: ignore[arg-type]
-    wrap = math.pi if side.startswith("edge") else math.tau  # no tab finds room between two edges that meet
+    wrap = math.pi if side.startswith("edge") else math.tau
     design, figures = built(Frustum(0.054, 0.054, 0.2, wrap), stack=stack, wires=side)
     text = guide(design, figures)
     steps = text.split("### Place")[0]
@@ -167,6 +167,12 @@ def test_the_bill_counts_every_sheet() -> None:
     bill = {item.item: item.quantity for item in bill_of_materials(designs, figures)}
     assert bill["4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts"] == "2"
     assert bill["plastic pin with flat head, 2.4 x 8 mm"] == "6"
+    chosen, figure = built(CONE)  # with holes of another width
+    pins = {item.item: item.quantity for item in bill_of_materials([*designs, chosen], [*figures, figure])}
+    assert (pins["plastic pin with flat head, 2.4 x 8 mm"], pins["plastic pin with flat head, 1.9 x 8 mm"]) == (
+        "6",
+        "3",
+    )
     net = sum(part.area for design in designs for k in (0, 6) for part in design.cuts[k].parts)
     assert bill["silicone foam sheet 2.50 mm"].startswith(f"{1e4 * net:.0f} cm2 net")
 
@@ -250,13 +256,32 @@ def test_a_link_without_room_at_either_end_carries_its_cable_on_what_is_bolted_t
 
 
 def test_only_a_sheet_whose_edges_meet_has_a_seam() -> None:
-    """Of a partial wrap the guide speaks of two edges; between edges that meet there is no room for tabs."""
+    """Of a partial wrap the guide speaks of two edges."""
     for wrap, seam in ((2 * math.pi, True), (math.pi, False)):
         design, figures = built(Frustum(0.054, 0.054, 0.2, wrap))
         assert design.has_seam == seam
         assert ("The seam: the edges of every part meet" in guide(design, figures)) == seam
-    with pytest.raises(GeometryError, match="sheet 1: at edge 0 the tabs would lie on the sheet itself"):
-        built(Frustum(0.054, 0.054, 0.2), wires="edge0")
+
+
+@pytest.mark.parametrize("side", ["edge0", "edge1"])
+def test_wires_at_an_edge_of_a_full_wrap_stand_up_from_the_seam_and_lie_over_it(side: SheetSide) -> None:
+    """Between edges that meet no tab lies flat; over the seam no touch is located."""
+    design, figures = built(Frustum(0.045, 0.06, 0.2), wires=side)
+    way, axis = design.way, design.place.link_frustum.inverse()
+    heights = np.array([design.place.frustum.locate(*axis.apply(tuple(point)))[2] for point in way.points])
+    assert heights == pytest.approx(design.options.stack.thickness), "on the outer face"
+    box = design.layout.active
+    off = np.abs(np.array([math.remainder(phi, math.tau) for _, phi in way.surface])) * design.place.frustum.radius1
+    assert off.max() < min(box.phi1, math.tau - box.phi2) * 0.045, "over what locates no touch"
+    assert (way.connector_length, way.tie_length) == (pytest.approx(0.06), pytest.approx(0.03, abs=4e-3))
+    text = guide(design, figures)
+    assert "The tabs stand up between the two edges of the seam" in text
+    assert "Glue the cable-tie mount on part 7, over the seam" in text
+    assert "Fold the tabs over" not in text
+    assert not figures.as_data(design)["cable"]["on_link"]
+    assert built(Frustum(0.045, 0.06, 0.2))[0].layout.plan.wires.startswith("end"), "only where it is asked for"
+    with pytest.raises(GeometryError, match="there is no free way of 60 mm for the cable"):
+        built(Frustum(0.05, 0.05, 0.04), wires=side)
 
 
 def test_the_bill_has_what_the_steps_use_up() -> None:

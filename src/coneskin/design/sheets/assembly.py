@@ -7,6 +7,7 @@ active beside all other bodies, or is left out with the reason; of the orders, t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -134,6 +135,7 @@ class _Variant:
     height: float
     rays: RayCaster | None
     wished: float
+    asked: bool
 
     @property
     def active(self) -> float:
@@ -150,6 +152,8 @@ class _Variant:
             apron = TabApron.of(self.place, self.layout, self.height, slope)
             if not apron.stands_in(self.rays):
                 break
+        if self.asked and self.layout.plan.wires.startswith("edge") and self.sheet.near(apron.feet, 0.0).any():
+            return TabApron.of(self.place, self.layout, self.height, math.inf)  # between edges that meet: up
         return apron
 
     @cached_property
@@ -158,13 +162,18 @@ class _Variant:
 
     def wired(self, others: Sequence[Body]) -> CableWay | str:
         """Return the way of its cable beside other bodies, or why there is none."""
-        if self.sheet.near(self.apron.feet, 0.0).any():
+        standing = math.isinf(self.apron.slope)
+        if not standing and self.sheet.near(self.apron.feet, 0.0).any():
             return "the tabs would lie on the sheet itself"
         if self.apron.stands_in(self.rays):
             return "the link stands out where the tabs leave"
         if any(body.near(self.apron.feet, BODY_CLEARANCE).any() for body in others):
             return "the tabs would meet another sheet or its wires"
-        way = self.surface.find_way(self.apron, self.layout.plan.wires, self.sheet, others, self.wished)
+        side = self.layout.plan.wires
+        if standing:
+            way = CableWay.over_seam(self.apron, side, self.sheet, self.wished)
+        else:
+            way = self.surface.find_way(self.apron, side, self.sheet, others, self.wished)
         return way or f"there is no free way of {1e3 * self.wished:.0f} mm for the cable with its tie and its connector"
 
 
@@ -216,7 +225,7 @@ def assemble(
                     why = f"rims and electrodes would leave less than {LEAST_ACTIVE_SHARE:.0%} of it active"
                     problems.setdefault(f"{why}; give widths (electrodes) to design it all the same")
                     continue
-                yield _Variant(cut, layout, thickness, tab_height, rays, connector)
+                yield _Variant(cut, layout, thickness, tab_height, rays, connector, wires is not None)
 
     left_out: dict[int, str] = {}
     choices: dict[int, list[_Variant]] = {}

@@ -124,7 +124,8 @@ class TabApron:
         feet: points of the strip above the link [m], shape (n, 3).
         tips: number of the point at the tip of the tab for each point at the rim, shape (m, 2).
         way_out: unit vectors in which rays find the link below each point, shape (n, 3).
-        slope: rise of the tabs over their length, where the link stands out beyond the rim.
+        slope: rise of the tabs over their length, where the link stands out beyond the rim; infinite where they stand
+            up from a seam.
     """
 
     u: float
@@ -165,6 +166,9 @@ class TabApron:
             rim = np.arange(len(rows)) * len(length)
             tips = rim + len(length) - 1
             at = middle, phi
+        if math.isinf(slope):
+            points, normals = place.place(grid[0].ravel(), np.full(grid[0].size, at[1]))
+            return cls(*at, points + (height + far)[:, None] * normals, np.stack([rim, tips], 1), normals, slope)
         points, normals = place.place(grid[0].ravel(), grid[1].ravel())
         feet = points + (height + slope * far)[:, None] * normals
         return cls(*at, feet, np.stack([rim, tips], 1), normals, slope)
@@ -199,6 +203,7 @@ class CableWay:
         lengths: from the rim along the way [m], shape (n,).
         tie: number of the point at which the cable tie is.
         hangs: True where the link ends before: tie and connector are on what is bolted to it there.
+        on_sheet: True where the wires stand up from a seam and lie on the sheet, over the seam.
     """
 
     side: SheetSide
@@ -210,6 +215,31 @@ class CableWay:
     lengths: Floats
     tie: int
     hangs: bool = False
+    on_sheet: bool = False
+
+    @classmethod
+    def over_seam(cls, apron: TabApron, side: SheetSide, own: SheetBody, wished: float) -> CableWay | None:
+        """Return the way of wires that stand up from a seam, towards the farther end; None where it is too short."""
+        slant = own.place.frustum.slant
+        ahead = 1.0 if apron.u < 0.5 * slant else -1.0
+        room = (slant - apron.u if ahead > 0.0 else apron.u) - MOUNT_REACH
+        length = min(wished, room)
+        if length < min(wished, _LEAST_WAY):
+            return None
+        gone = np.linspace(0.0, length, max(9, math.ceil(length / _LATTICE_STEP)))
+        at = np.stack([apron.u + ahead * gone, np.full(len(gone), apron.phi)], axis=1)
+        points, normals = own.place.place(*at.T)
+        return cls(
+            side,
+            apron.u,
+            apron.phi,
+            frozen(at, (None, 2), "surface"),
+            frozen(points + own.thickness * normals, (None, 3), "points"),
+            frozen(normals, (None, 3), "normals"),
+            frozen(gone, (None,), "lengths"),
+            len(gone) // 2,
+            on_sheet=True,
+        )
 
     @property
     def connector_length(self) -> float:

@@ -62,8 +62,10 @@ def bill_of_materials(
         covered += 0.5 * sum(s.outline.length for k in (1, 5) for part in design.cuts[k].parts for s in part.strokes)
     wires = [wire for item in figures for wire in item.wires]
     count = len(designs)
-    pins = sum(len(design.layout.holes) for design in designs)
-    stack, plan = designs[0].options.stack, designs[0].layout.plan
+    pins: dict[str, int] = defaultdict(int)
+    for design in designs:
+        size = f"{design.layout.plan.hole * 1e3 - 0.1:.1f} x {design.options.stack.thickness * 1e3 + 2.0:.0f} mm"
+        pins[size] += len(design.layout.holes)
     items += [
         _BillItem(
             f"double-sided silicone adhesive tape {ADHESIVE * 1e3:g} mm, without carrier",
@@ -106,15 +108,11 @@ def bill_of_materials(
                 "around the collars",
             ),
         ]
-    if pins:
-        items.append(
-            _BillItem(
-                f"plastic pin with flat head, {plan.hole * 1e3 - 0.1:.1f} x {stack.thickness * 1e3 + 2.0:.0f} mm",
-                f"{pins}",
-                "registration holes",
-            )
-        )
-    return items
+    return items + [
+        _BillItem(f"plastic pin with flat head, {size}", f"{number}", "registration holes")
+        for size, number in pins.items()
+        if number
+    ]
 
 
 def _strips(material: str) -> str:

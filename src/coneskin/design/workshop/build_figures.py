@@ -170,7 +170,7 @@ class BuildFigures:
                 **_point(way.u, way.phi),
                 "tie_mm": _mm(way.tie_length),
                 "connector_mm": _mm(way.connector_length),
-                "on_link": not way.hangs,
+                "on_link": not (way.hangs or way.on_sheet),
                 "tab_rise_deg": round(math.degrees(math.atan(design.apron.slope)), 1),
                 "way": [
                     {"xyz_mm": [_mm(x) for x in point], "normal": [round(x, 5) + 0.0 for x in normal]}

@@ -214,14 +214,16 @@ def _wrap_steps(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
 def _cable_steps(design: SheetDesign) -> Iterator[str]:
     """Yield the steps from the tabs to the connector."""
     way, plan = design.way, design.layout.plan
-    if plan.tab:
+    if way.on_sheet:
+        yield "The tabs stand up between the two edges of the seam: lay their wires down on part 7 along it."
+    elif plan.tab:
         yield f"Fold the tabs over {side_name(plan.wires)} outwards along the green lines, away from the link."
-    if design.apron.slope:
+    if design.apron.slope and not way.on_sheet:
         rise = math.degrees(math.atan(design.apron.slope))
         yield f"The link stands out beyond that rim: bend the tabs up by {rise:.0f} deg, so that none lies on it."
-    if plan.wires.startswith("edge"):
+    if plan.wires.startswith("edge") and not way.on_sheet:
         yield f"The tabs leave at {side_name(plan.wires)}: lead them out on the bare link beside that edge."
-    ground = "on the link"
+    ground = "on part 7, over the seam, where no touch is located," if way.on_sheet else "on the link"
     if way.hangs:
         ground = "on what is bolted to the link there and moves with it, such as a flange or a cover"
         yield (
