@@ -2,7 +2,8 @@
 
 There are seven: lower substrate, lower electrodes, lower conductive, isolation, upper conductive, upper electrodes,
 upper substrate. A part that is laid with the other face up is its mirror image, with tabs and leads on the wrong side,
-so every part is labelled with the face that is up. By default that is the face on which the next part is glued.
+so every part is labelled with the face that is up. By default that is the face on which the next part is glued, and of
+a cover that is wrapped last its outside, on which its labels can be read.
 Electrodes go on the face of each conductive sheet that faces the isolation: a printed or coated film conducts on that
 face alone.
 """
@@ -166,6 +167,7 @@ def cut_sheets(
     overlap: float = 0.0,
     snap: float = 1e-5,
     face_up: FaceUp = "work",
+    joints: tuple[str, ...] = ("", ""),
 ) -> tuple[CutSheet, ...]:
     """Draw the seven cut sheets of a sensor.
 
@@ -178,6 +180,7 @@ def cut_sheets(
         overlap: width of a flap that closes the seam, on the upper substrate beyond phi = wrap [m].
         snap: a layer is cut as a rectangle where that moves no cut by more than this [m].
         face_up: "work" for the face on which the next part is glued, or one face for all parts.
+        joints: what is written beside the names of end 1 and end 2.
 
     Raises:
         GeometryError: kerf, overlap or snap is negative or not finite, a detail is smaller than the kerf, or
@@ -186,8 +189,8 @@ def cut_sheets(
     for name, value in (("kerf", kerf), ("overlap", overlap), ("snap", snap)):
         if not (math.isfinite(value) and value >= 0.0):
             raise GeometryError(f"{name} must be finite and not negative, got {value * 1e3:.4g} mm")
-    if overlap and layout.plan.wires == "edge1":
-        raise GeometryError("an overlap at edge1 would cover the tabs there: choose another side for the wires")
+    if overlap and layout.plan.wires.startswith("edge"):
+        raise GeometryError(f"an overlap would cover the tabs at {layout.plan.wires}: let the wires leave at an end")
     around = layout.sheet.wrap * min(layout.sheet.radius1, layout.sheet.radius2)
     if overlap > _WIDEST_FLAP * around:
         raise GeometryError(
@@ -215,10 +218,14 @@ def cut_sheets(
             parts = tuple(_foil(layout, surface, which, face, plain) for which in pair)
         else:
             crosses = CoverMarks.of(flat, layout, surface, stack, place) if index == 4 else None
-            strokes = _marks(layout, surface, index, crosses) + _border(
+            strokes = _marks(layout, surface, index, crosses, stack.assembly != "loose") + _border(
                 layout, surface, index, overlap if index == 4 else 0.0
             )
-            labels = part_labels(layout, surface, (*text, _ascii_text(material)), crosses.clear if crosses else None)
+            ends = tuple(
+                f"{end} {joint}".strip() for end, joint in zip(("END 1 (B)", "END 2 (A)"), joints, strict=True)
+            )
+            clear = crosses.clear if crosses else None
+            labels = part_labels(layout, surface, (*text, _ascii_text(material)), clear, ends)
             labels += tuple(crosses.labels()) if crosses else ()
             parts = (CutPart(name, strokes, labels),)
         return CutSheet(
@@ -232,7 +239,7 @@ def cut_sheets(
         sheet(4, "isolation", 2, "outside"),
         sheet(5, "upper conductive", 3, "inside"),
         sheet(6, "upper electrodes", 3, "inside", foil=True),
-        sheet(7, "upper substrate", 4, "inside"),
+        sheet(7, "upper substrate", 4, "outside" if stack.assembly == "loose" else "inside"),
     )
 
 
@@ -269,13 +276,16 @@ def _border(layout: SheetLayout, surface: Frustum, index: int, overlap: float) -
     return (*strokes, Stroke("cut", draw_shape(surface, shape)))
 
 
-def _marks(layout: SheetLayout, surface: Frustum, index: int, crosses: CoverMarks | None) -> tuple[Stroke, ...]:
+def _marks(
+    layout: SheetLayout, surface: Frustum, index: int, crosses: CoverMarks | None, glued: bool
+) -> tuple[Stroke, ...]:
     """Mark the conductive sheet on its substrate, the electrodes on their conductive sheet, touches on the cover."""
     if index == 0:
         return (Stroke("score", draw_shape(surface, layout.lower)),)
     if crosses:
         lines = (Stroke("score", draw_shape(surface, line, closed=False)) for line in crosses.lines())
-        return (Stroke("score", draw_shape(surface, layout.upper)), *lines)
+        outline = (Stroke("score", draw_shape(surface, layout.upper)),)  # on the face that the sheet is glued to
+        return (*(outline if glued else ()), *lines)
     marks: tuple[SurfaceShape, ...] = layout.marks.get({1: "lower", 3: "upper"}.get(index, ""), ())
     return tuple(Stroke("score", draw_shape(surface, mark, closed=False)) for mark in marks)
 

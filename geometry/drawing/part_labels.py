@@ -67,7 +67,11 @@ def _text_width(text: str, height: float) -> float:
 
 
 def part_labels(
-    layout: SheetLayout, surface: Frustum, lines: tuple[str, ...], clear: SurfaceRectangle | None = None
+    layout: SheetLayout,
+    surface: Frustum,
+    lines: tuple[str, ...],
+    clear: SurfaceRectangle | None = None,
+    ends: tuple[str, ...] = ("END 1 (B)", "END 2 (A)"),
 ) -> tuple[PartLabel, ...]:
     """Place a block of lines in the middle of a sheet, and the names of its four sides.
 
@@ -76,13 +80,14 @@ def part_labels(
         surface: the cone for which the sheet is cut.
         lines: lines of the block, the most important first; the last ones are left out if all would be too small.
         clear: part of the sheet in which the block has to lie; by default the active area.
+        ends: names of its ends.
     """
     room = layout.active
     free = clear or room
     phi = 0.5 * (free.phi1 + free.phi2)
     height = _MAX_HEIGHT
     while height >= _MIN_HEIGHT:
-        sides = tuple(_sides(layout, surface, 0.6 * height))
+        sides = tuple(_sides(layout, surface, 0.6 * height, ends))
         block = _block(surface, 0.5 * (free.u1 + free.u2), phi, lines, height)
         inner = _shrunk(surface, free, 0.5 * height if clear else 2.0 * height)
         if all(_inside(surface, inner, label) for label in block) and all(
@@ -90,7 +95,7 @@ def part_labels(
         ):
             return block + sides
         height *= 0.93
-    return part_labels(layout, surface, lines[:-1], clear) if len(lines) > 1 else ()
+    return part_labels(layout, surface, lines[:-1], clear, ends) if len(lines) > 1 else ()
 
 
 def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, title: str = "") -> tuple[PartLabel, ...]:
@@ -132,12 +137,12 @@ def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, ti
     return ()
 
 
-def _sides(layout: SheetLayout, surface: Frustum, height: float) -> Iterator[PartLabel]:
+def _sides(layout: SheetLayout, surface: Frustum, height: float, ends: tuple[str, ...]) -> Iterator[PartLabel]:
     room = layout.active
     u, phi = 0.5 * (room.u1 + room.u2), 0.5 * (room.phi1 + room.phi2)
     degrees = math.degrees(surface.wrap)
-    yield _label(surface, "END 1 (B)", room.u1 + height, phi, height)
-    yield _label(surface, "END 2 (A)", room.u2 - height, phi, height)
+    yield _label(surface, ends[0], room.u1 + height, phi, height)
+    yield _label(surface, ends[1], room.u2 - height, phi, height)
     for text, edge, inward in (("EDGE 0 (D)", room.phi1, 1.0), (f"EDGE {degrees:.4g} (C)", room.phi2, -1.0)):
         yield _label(surface, text, u, edge + inward * height / surface.radius_at(u), height, along_edge=True)
 

@@ -85,8 +85,8 @@ def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_p
     assert second["link_cone"]["xyz_mm"][2] - end == pytest.approx(2.0 / math.cos(alpha), rel=0.05)
     assert first["gaps_mm"] == {"sheet 2": pytest.approx(2.0, abs=2e-3)}
     report = (tmp_path / "out" / "report.md").read_text()
-    assert "All four wires leave at end 1." in report
-    assert "All four wires leave at end 2." in report
+    assert "| tabs | over end 1 |" in report
+    assert "| tabs | over end 2 |" in report
 
 
 def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_path):
@@ -193,7 +193,7 @@ def test_a_mistake_is_one_clear_line_and_leaves_nothing(words, line, tmp_path, c
             "current_full_scale_ma must suit the normal drive current",
         ),
         (CYLINDER, "electronics.supply_v=3.3", "supply_v must be at most 95 % of adc_v"),
-        (CYLINDER, "sheet.overlap_mm=5; sheet.wires=edge1", "at the edge of C the tabs would lie on the sheet itself"),
+        (CYLINDER, "sheet.overlap_mm=5; sheet.wires=edge1", "an overlap would cover the tabs at edge1"),
         (CYLINDER, "search.touch_side=[1, 0, 0]", "search.touch_side is for a mesh"),
         (
             [*CYLINDER, "--wrap-deg", "180"],
@@ -299,7 +299,7 @@ def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
     assert "rectangle 358.142 x 200.000 mm" in report  # 2 pi (54 + 3)
     assert "One count of 10 bits over 3.3 V at a supply of 3 V" in report
     assert "| full scale of the current | 30.000 mA |" in report
-    assert "| sheet 1 | 4-isolation | c 0.80 mm |" in report
+    assert "sheet 1,4-isolation,c 0.80 mm," in (tmp_path / "out" / "materials.csv").read_text()
     sensor, _ = sensor_of(tmp_path / "out")
     assert (sensor.upper_sheet_ohms, sensor.lower_sheet_ohms) == (500.0, 2000.0)
     assert sensor.electronics.current_full_scale == pytest.approx(0.03)

@@ -10,7 +10,7 @@ import coneskin as cs
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, _blind_angle, cover_seams, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
-from coneskin.design.workshop.build_guide import guide_lines
+from coneskin.design.workshop.build_guide import sheet_lines
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
@@ -84,8 +84,8 @@ def test_a_strip_that_cannot_be_is_refused() -> None:
 def test_the_guide_places_a_strip_by_the_seam_below_it() -> None:
     options = DesignOptions(cover_seam=True)
     _, strip = cover_seams(design_sheets([PlacedFrustum(SHAPES["cylinder"])], options))
-    text = "\n".join(guide_lines(strip, measure_build(strip, 1), "sheet-2"))
-    assert "Clean the outside of sheet 1 with isopropanol" in text
+    text = "\n".join(sheet_lines(strip, measure_build(strip, 1), "sheet-2"))
+    assert "| what it lies on | the outside of sheet 1 |" in text
     assert "It lies on the outside of sheet 1, over its seam" in text
     start = active_azimuths(
         replace(strip, layout=replace(strip.layout, active=replace(strip.layout.active, phi1=0.0))), Pose()

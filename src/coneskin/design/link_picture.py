@@ -216,7 +216,8 @@ def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
             if seen.mean() >= 0.2:  # else the other side shows it better
                 flat = view.flat(points[seen])
                 right = flat[flat[:, 0].argmax()]
-                names.append((right, f"{design.name}, end {end}", _SHEET_COLOURS[index % 4]))
+                joints = "".join(f", joint {joint}" for joint in design.joints.get(f"end {end}", ()))
+                names.append((right, f"{design.name}, end {end}{joints}", _SHEET_COLOURS[index % 4]))
     below = -math.inf
     for at, name, colour in sorted(names, key=lambda item: float(item[0][1])):
         below = max(below + 0.06 * view.size, float(at[1]))

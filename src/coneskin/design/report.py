@@ -1,4 +1,4 @@
-"""Report of a design (report.md): dimensions, materials, and the guide by which it is built."""
+"""Report of a design (report.md): what to buy, the guide by which it is built, and how it was designed."""
 
 from __future__ import annotations
 
@@ -11,19 +11,14 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
 from .sheets.sheet_design import SheetDesign
-from .sheets.summary import design_summary, material_rows, sector_text, sheet_folder, small_active_area
+from .sheets.summary import design_summary, sector_text, sheet_folder, small_active_area
 from .workshop.bill_of_materials import bill_of_materials
-from .workshop.build_figures import BuildFigures, section_head, side_name, table_head
-from .workshop.build_guide import guide_lines
+from .workshop.build_figures import BuildFigures, section_head, table_head
+from .workshop.build_guide import common_lines, sheet_lines
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
 
-_ASSEMBLY_WORDS = {
-    "loose": "Wrap the layers one after another; each is cut for its own radius.",
-    "pairs": "Glue each conductive sheet to its substrate while both are flat, then wrap the pairs.",
-    "bonded": "Glue all layers together while they are flat, then wrap the sheet; check the strains above.",
-}
 _TOOL_LIST = (
     "Tools: what cuts (a plotter with knives, or a scalpel and a cutting mat), caliper, steel rule, tape measure, try "
     "square, soft pencil, needle, hand roller of rubber, kitchen scales, multimeter, wire stripper, crimping tool for "
@@ -55,27 +50,19 @@ def report_text(
     lines += [f"* {note}" for note in notes]
     lines += _coverage(fit) if fit else []
     lines += [f"* **Warning: {small}**" for small in map(small_active_area, designs) if small]
-    for caption, file in pictures:
-        lines += ["", f"![{caption}]({file})", "", caption]
+    shown = {
+        name: [line for caption, file in pictures if f"/{name}" in file for line in ("", f"![{caption}]({file})")]
+        for name in ("link", "weights", *(f"{design.name.replace(' ', '-')}-" for design in designs))
+    }
+    lines += [*shown["link"], *shown["weights"], "", "## Everything to buy or to cut", ""]
+    lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
+    lines += ["", f"`materials.csv` has the size of each part. {_TOOL_LIST}", ""]
+    lines += common_lines(designs, figures)
+    for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
+        folder, drawn = sheet_folder(designs, index).as_posix(), shown[f"{design.name.replace(' ', '-')}-"]
+        lines += ["", *sheet_lines(design, item, folder, index, drawn)]
     for index, design in enumerate(designs):
         lines += ["", *_sheet_section(design, sheet_folder(designs, index).as_posix())]
-    lines += [
-        "",
-        "## Materials",
-        "",
-        "Areas are net; width and depth are those of the piece of material from which the parts are cut.",
-        "",
-    ]
-    keys = ("sheet", "layer", "material", "area_cm2", "width_mm", "depth_mm", "cut_length_mm")
-    head = ("sheet", "cut sheet", "material", "area [cm2]", "width [mm]", "depth [mm]", "length of cuts [mm]")
-    lines += _table(head, [[_text(row[key]) for key in keys] for row in material_rows(designs)])
-    lines += ["", "### Everything to buy or to cut", ""]
-    lines += _table(("item", "quantity", "for"), bill_of_materials(designs, figures, beds))
-    lines += ["", _TOOL_LIST]
-    if len(designs) > 1:
-        lines += ["", "Build all sheets flat in any order; put them on the link in the order of their numbers."]
-    for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
-        lines += ["", *guide_lines(design, item, sheet_folder(designs, index).as_posix())]
     return "\n".join(lines) + "\n"
 
 
@@ -99,7 +86,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     data, stack = design_summary(design), design.options.stack
     side, active = design.place.frustum, design.active.frustum
     sensor = "sensor.toml" if folder == "." else f"{folder}/sensor.toml"
-    yield f"## {design.name.capitalize()}"
+    yield f"## How {design.name} was designed"
     yield ""
     rows = [
         ["radius at end 1, end 2", f"{side.radius1 * 1e3:.3f}, {side.radius2 * 1e3:.3f} mm"],
@@ -129,11 +116,20 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         if fit["bridged_share"] > 0.0:
             bridged = f"{fit['bridged_share']:.1%} of the sheet, {fit['bridged_depth_mm']:.1f} mm deep"
             rows.append(["bridged holes and grooves", bridged])
+    plan, patch = design.layout.plan, data["active_patch"]
+    rows.append(["electrodes", f"{1e3 * plan.electrode:g} mm wide; C and D wedges between rays, at their narrow end"])
+    share = f"{data['active_area_cm2']:.1f} cm2, {data['active_share']:.1%} of the sheet"
+    where = (
+        f"u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to {patch['phi2_deg']:.2f} deg"
+    )
+    rows.append(["active area", f"{share}: {where}"])
+    rows.append(["no touch located around the link", f"{360.0 - patch['phi2_deg'] + patch['phi1_deg']:.1f} deg"])
+    cone = f"radius {active.radius1 * 1e3:.3f} to {active.radius2 * 1e3:.3f} mm, slant {active.slant * 1e3:.3f} mm, "
+    rows.append([f"cone of the decoder (`{sensor}`)", f"{cone}wrap {math.degrees(active.wrap):.3f} deg"])
     rows += [[f"least gap to {other}", f"{gap:.2f} mm"] for other, gap in data["gaps_mm"].items()]
     yield from _table(("quantity", "value"), rows)
     yield from section_head("Layers")
-    assembly = f"Assembly: {stack.assembly}. {_ASSEMBLY_WORDS[stack.assembly]}"
-    yield f"{assembly} The patterns differ in radius, but not in theta0."
+    yield f"Assembly: {stack.assembly}. The patterns differ in radius, but not in theta0."
     yield ""
     surfaces = {cut.name: cut.surface for cut in design.cuts}
     table = []
@@ -161,32 +157,11 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         "strain of inner, outer face",
     )
     yield from _table(head, table)
-    yield from section_head("Electrodes")
-    plan, patch = design.layout.plan, data["active_patch"]
-    share = f"{data['active_area_cm2']:.1f} cm2, {data['active_share']:.1%} of the sheet"
-    width = f"{plan.electrode * 1e3:g} mm wide"
-    yield f"* Upper sheet: B on the arc of end 1 (supply), A on the arc of end 2 (ground), {width}."
-    yield (
-        "* Lower sheet: D on the edge phi = 0 (ground), C on the edge phi = wrap (supply), wedges between two rays, "
-        f"{width} at the narrow end."
-    )
-    yield f"* All four wires leave at {side_name(plan.wires)}."
-    yield (
-        f"* Active area: u {patch['u1_mm']:.2f} to {patch['u2_mm']:.2f} mm, phi {patch['phi1_deg']:.2f} to "
-        f"{patch['phi2_deg']:.2f} deg of the sheet: {share}. Around the link no touch is located over "
-        f"{360.0 - patch['phi2_deg'] + patch['phi1_deg']:.1f} deg."
-    )
-    yield (
-        f"* The decoder uses radius {active.radius1 * 1e3:.3f} to {active.radius2 * 1e3:.3f} mm, slant "
-        f"{active.slant * 1e3:.3f} mm, wrap {math.degrees(active.wrap):.3f} deg (`{sensor}`)."
-    )
-    yield ""
     parts = design.electronics
     radial, angular = (1e3 * amperes for amperes in design.drive_currents)
     full_scale = 1e3 * parts.current_full_scale
     count = full_scale / parts.full_count
-    yield "### Electronics"
-    yield ""
+    yield from section_head("Electronics")
     upper, lower = design.conductive
     yield "What was not given was chosen for the shape of this sheet (docs/do/electronics.md); options change it."
     yield ""
@@ -205,16 +180,13 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         ],
     )
     yield from section_head("Accuracy forecast")
+    along, around, turn = (max(s[key] for s in data["forecast"]) for key in ("along_mm", "around_mm", "azimuth_deg"))
     yield (
         f"One count of {parts.adc_bits} bits over {parts.adc_volts:g} V at a supply of "
         f"{parts.supply_volts:g} V (eq. 25, 26). This is the limit of the A/D converter; noise, the area of the "
-        "contact and uneven material add to it. The paper measured 1.6 mm and 0.5 deg."
+        f"contact and uneven material add to it: {along:.3f} mm along, {around:.3f} mm around and {turn:.3f} deg at "
+        "most (`design.json` has it at five places). The paper measured 1.6 mm and 0.5 deg."
     )
-    yield ""
-    keys = {"u_mm": 1, "along_mm": 4, "around_mm": 4, "azimuth_deg": 4, "theta_deg": 5}
-    steps = [[f"{step[key]:.{digits}f}" for key, digits in keys.items()] for step in data["forecast"]]
-    columns = ("u of the active area [mm]", "along [mm]", "around [mm]", "azimuth [deg]", "theta [deg]")
-    yield from _table(columns, steps)
 
 
 def _sharpest(place: PlacedFrustum) -> float:
@@ -230,7 +202,3 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     yield from table_head(*head)
     for row in rows:
         yield "| " + " | ".join(row) + " |"
-
-
-def _text(value: object) -> str:
-    return f"{value:.1f}" if isinstance(value, float) else str(value)

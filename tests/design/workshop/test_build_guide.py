@@ -12,7 +12,7 @@ from coneskin.design.design_toml import DESIGN_TABLES
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.bill_of_materials import bill_of_materials
 from coneskin.design.workshop.build_figures import LOOP, BuildFigures, measure_build
-from coneskin.design.workshop.build_guide import guide_lines
+from coneskin.design.workshop.build_guide import common_lines, sheet_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
@@ -34,20 +34,33 @@ def built(frustum: Frustum, **options: object) -> tuple[SheetDesign, BuildFigure
 
 
 def guide(design: SheetDesign, figures: BuildFigures, folder: str = ".") -> str:
-    return "\n".join(guide_lines(design, figures, folder))
+    return "\n".join([*common_lines([design], [figures]), *sheet_lines(design, figures, folder)])
 
 
-def test_every_sheet_is_built_by_steps_of_its_own() -> None:
-    """The wires of the second sheet leave at the other end, and its tabs are folded there."""
+def test_common_steps_are_told_once_and_a_sheet_has_two_pages_of_its_own() -> None:
+    """The wires of the second sheet leave at the other end; each row that a step names is in the sheet's table."""
     designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15))
-    for number, (design, end) in enumerate(zip(designs, (1, 2), strict=True), 1):
-        text = guide(design, measure_build(design, number - 1), f"sheet-{number}")
-        assert f"## Building sheet {number}\n" in text
-        assert f"Fold the tabs over end {end} outwards" in text
-        assert f"The tabs stand out over end {end}" in text
-        assert f"`sheet-{number}/cut/`" in text
-        steps = [int(word) for word in re.findall(r"^(\d+)\. ", text, re.MULTILINE)]
-        assert steps == list(range(1, len(steps) + 1))
+    figures = [measure_build(design, index) for index, design in enumerate(designs)]
+    common = "\n".join(common_lines(designs, figures))
+    steps = [int(word) for word in re.findall(r"^(\d+)\. ", common, re.MULTILINE)]
+    assert steps == list(range(1, len(steps) + 1))
+    named = set(re.findall(r"(?<=[ (])\*([A-Za-z][\w -]*)\*", common))
+    named -= {"Check", "Place", "italics", "outside up", "inside up"}
+    for number, (design, item) in enumerate(zip(designs, figures, strict=True), 1):
+        text = "\n".join(sheet_lines(design, item, f"sheet-{number}", number - 1))
+        rows = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", text, re.MULTILINE))
+        assert text.startswith(f"## Sheet {number}\n")
+        assert rows["tabs"] == f"over end {number}"
+        assert rows["sensor number"] == str(number - 1)
+        assert rows["files"] == f"`sheet-{number}/cut/`, `sheet-{number}/sensor.toml`"
+        assert rows[f"end {3 - number}"] == f"joint 1: meets end {number} of sheet {3 - number}"
+        assert {"conductive sheet", "part 1", "collars", "cable"} <= named <= set(rows)
+        assert len(text.split()) < 1000, "two pages"
+        for cut in design.cuts:
+            labels = [label.text for part in cut.parts for label in part.labels]
+            assert ("END 1 (B) JOINT 1" in labels) == (number == 2 and cut.number not in (2, 6))
+    assert "press each sheet in turn" in common, "exchanged plugs of sheets with the same ohms"
+    assert designs[0].cuts[6].face == "outside", "the labels of the cover are read on the link"
 
 
 @pytest.mark.parametrize("assembly", ["loose", "pairs", "bonded"])
@@ -63,7 +76,12 @@ def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) ->
     for part in (1, 3, 4, 5, 7):
         assert re.search(rf"\b[Pp]arts? {part}\b|\b1 and 3\b|\b5 and 7\b", steps)
     assert f"part 3 on the bench, {design.cuts[2].face} up" in steps
-    assert ("lead them out on the bare link beside that edge" in steps) == side.startswith("edge")
+    assert ("Prick the centres" in steps) == (assembly != "loose"), "only a cover that is wrapped last is outside up"
+    marked = sum(
+        stroke.outline.closed for part in design.cuts[6].parts for stroke in part.strokes if stroke.kind == "score"
+    )
+    assert marked == (assembly != "loose"), "where part 5 is glued"
+    assert ("lead the wires out on the bare link beside that edge" in steps) == side.startswith("edge")
 
 
 @pytest.mark.parametrize("side", ["end1", "end2"])
@@ -211,11 +229,11 @@ def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> 
     """A short sheet: what lies beside its active area carries most of the current, and the guide says so."""
     design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)), plan=ElectrodePlan())
     text = guide(design, figures, "sheet-2")
-    assert "Write the measured sheets into `sheet-2/sensor.toml`" in text
     ab, cd = figures.pairs
     assert cd.ohms / cd.squares < 0.5 * cd.sheet_ohms
-    assert "ohm per square (lower, upper), within 20%." in text
-    assert f"gives {ab.ohms / ab.squares:.4g} and {cd.ohms / cd.squares:.4g}" in text
+    for name, pins, pair in (("upper", "1-2", ab), ("lower", "3-4", cd)):
+        row = f"| {name}_sheet_ohm | reading {pins} divided by {pair.squares:.4f}, nominally "
+        assert f"{row}{pair.ohms / pair.squares:.4g} |" in text
 
 
 def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
@@ -242,7 +260,7 @@ def test_a_cable_lies_where_the_link_goes_on(low: float, high: float, end: str) 
     mesh = ending_at(low, high)
     (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions(), mesh=mesh)
     text = guide(design, measure_build(design, 0, "mesh", mesh))
-    assert f"Fold the tabs over {end}" in text
+    assert f"| tabs | over {end} |" in text
     assert "bolted to the link" not in text
     assert low < design.way.points[:, 2].min() < design.way.points[:, 2].max() < high
 
@@ -260,7 +278,7 @@ def test_only_a_sheet_whose_edges_meet_has_a_seam() -> None:
     for wrap, seam in ((2 * math.pi, True), (math.pi, False)):
         design, figures = built(Frustum(0.054, 0.054, 0.2, wrap))
         assert design.has_seam == seam
-        assert ("The seam: the edges of every part meet" in guide(design, figures)) == seam
+        assert ("The *seam*: the edges of every part meet" in guide(design, figures)) == seam
 
 
 @pytest.mark.parametrize("side", ["edge0", "edge1"])
@@ -275,9 +293,8 @@ def test_wires_at_an_edge_of_a_full_wrap_stand_up_from_the_seam_and_lie_over_it(
     assert off.max() < min(box.phi1, math.tau - box.phi2) * 0.045, "over what locates no touch"
     assert (way.connector_length, way.tie_length) == (pytest.approx(0.06), pytest.approx(0.03, abs=4e-3))
     text = guide(design, figures)
-    assert "The tabs stand up between the two edges of the seam" in text
-    assert "Glue the cable-tie mount on part 7, over the seam" in text
-    assert "Fold the tabs over" not in text
+    assert "they stand up between the two edges of the seam" in text
+    assert "all of it on part 7, over the seam" in text
     assert not figures.as_data(design)["cable"]["on_link"]
     assert built(Frustum(0.045, 0.06, 0.2))[0].layout.plan.wires.startswith("end"), "only where it is asked for"
     with pytest.raises(GeometryError, match="there is no free way of 60 mm for the cable"):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -150,6 +151,7 @@ class SheetDesign:
         apron: strip of its tabs beyond the rim.
         way: of its cable on the link.
         gaps: least distance to each other sheet nearer than 20 mm, by its name [m].
+        joints: what meets its "end 1" and its "end 2", by the number of the joint, such as {1: "end 1 of sheet 2"}.
         fit: fit of the place to the mesh; None for a link given by its dimensions.
         above: name of the sheet on which it lies, where it is a strip over the seam of that.
         seam_offset: angle from edge 0 of such a strip to the middle of the seam below it [rad].
@@ -166,6 +168,7 @@ class SheetDesign:
     apron: TabApron
     way: CableWay
     gaps: Mapping[str, float] = field(default_factory=dict)
+    joints: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     fit: FittedSheet | None = None
     above: str = ""
     seam_offset: float = 0.0
@@ -290,10 +293,12 @@ def design_assembly(
     if fits:
         left_out = [f"no sheet of {_dimensions(links[index].frustum)}: {why}" for index, why in refused.items()]
     designs = []
+    joints = _joints(placed, first)
     for number, one in enumerate(placed, first):
         apart = {f"sheet {k}": sheet_gap(one.sheet, two.sheet)[0] for k, two in enumerate(placed, first) if k != number}
         try:
-            designs.append(_sheet_design(f"sheet {number}", one, options, apart, fits[one.index] if fits else None))
+            fit = fits[one.index] if fits else None
+            designs.append(_sheet_design(f"sheet {number}", one, options, apart, joints[number], fit))
         except GeometryError as exc:
             raise GeometryError(f"sheet {number}: {exc}") from exc
         except SensorError as exc:
@@ -301,8 +306,28 @@ def design_assembly(
     return tuple(designs), tuple(left_out)
 
 
+def _joints(placed: Sequence[PlacedSheet], first: int) -> dict[int, dict[str, dict[int, str]]]:
+    """Return, by sheet and end, what meets it, with the number of the joint."""
+    found: dict[int, dict[str, dict[int, str]]] = {number: {} for number in range(first, first + len(placed))}
+    count = 0
+    for (i, one), (j, two) in combinations(enumerate(placed, first), 2):
+        gaps = sheet_gap(one.sheet, two.sheet), sheet_gap(two.sheet, one.sheet)
+        shares = [u / sheet.place.frustum.slant for (_, u), sheet in zip(gaps, (one, two), strict=True)]
+        if gaps[0][0] < _NEAR_SHEET and all(abs(share - 0.5) > 0.45 for share in shares):
+            count += 1
+            ends = [f"end {1 if share < 0.5 else 2}" for share in shares]
+            found[i].setdefault(ends[0], {})[count] = f"{ends[1]} of sheet {j}"
+            found[j].setdefault(ends[1], {})[count] = f"{ends[0]} of sheet {i}"
+    return found
+
+
 def _sheet_design(
-    name: str, placed: PlacedSheet, options: DesignOptions, apart: Mapping[str, float], fit: FittedSheet | None
+    name: str,
+    placed: PlacedSheet,
+    options: DesignOptions,
+    apart: Mapping[str, float],
+    joints: Mapping[str, Mapping[int, str]],
+    fit: FittedSheet | None,
 ) -> SheetDesign:
     """Return a sheet with its drawings and its electronics."""
     active = _active(placed.place, placed.layout, options.stack)
@@ -317,6 +342,7 @@ def _sheet_design(
         overlap=options.overlap,
         snap=options.snap,
         face_up=options.face_up,
+        joints=tuple(" ".join(f"JOINT {number}" for number in joints.get(end, ())) for end in ("end 1", "end 2")),
     )
     return SheetDesign(
         name=name,
@@ -330,6 +356,7 @@ def _sheet_design(
         apron=placed.apron,
         way=placed.way,
         gaps={other: gap for other, gap in apart.items() if gap < _NEAR_SHEET},
+        joints=joints,
         fit=fit,
     )
 
