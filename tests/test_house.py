@@ -59,7 +59,12 @@ HOMES = {
     "argcomplete": ("src/coneskin/cli.py",),
     "mujoco": ("src/coneskin/impact/simulation/mujoco_*.py",),
     "mcap": ("src/coneskin/runs/export/mcap_file.py",),
-    "matplotlib": ("skin/field/pictures.py", "src/coneskin/core/picture_file.py", "src/coneskin/**/*picture*.py"),
+    "matplotlib": (
+        "skin/field/pictures.py",
+        "src/coneskin/core/picture_file.py",
+        "src/coneskin/**/*picture*.py",
+        "src/coneskin/runs/what_if/variants.py",
+    ),
     "viser": ("src/coneskin/view/page_server.py",),
     "zmq": ("src/coneskin/session/event_publisher.py",),
     "paho": ("src/coneskin/session/event_publisher.py",),

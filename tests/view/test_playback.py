@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from coneskin.view.live_page import _DELAY, _Playout
+from coneskin.view.live_page import _POSE_DELAY, _Playout
 from coneskin.view.run_page import _Playback
 
 
@@ -76,7 +76,7 @@ def test_parcels_become_even_steps() -> None:
 def test_what_is_shown_is_late_by_the_delay() -> None:
     """Of a run whose parcels come at once; the offset is seen at pictures, which fall a third of a step apart."""
     for now, _, at in shown(late=0.0)[30:]:
-        assert at == pytest.approx(now + RUN - _DELAY, abs=STEP / 3.0)
+        assert at == pytest.approx(now + RUN - _POSE_DELAY, abs=STEP / 3.0)
 
 
 @pytest.mark.parametrize("late", [0.0, 0.03, 0.2])
@@ -89,7 +89,7 @@ def test_it_is_never_ahead_and_never_runs_back(late: float) -> None:
 def test_a_run_that_ends_is_shown_to_its_end() -> None:
     playout = _Playout()
     playout.time(RUN, 1.0)
-    assert playout.time(RUN, 1.0 + 0.5 * _DELAY) < RUN
+    assert playout.time(RUN, 1.0 + 0.5 * _POSE_DELAY) < RUN
     assert playout.time(RUN, 2.0) == RUN
 
 
@@ -98,4 +98,4 @@ def test_a_parcel_after_a_silence_is_caught_up_with() -> None:
     playout = _Playout()
     playout.time(RUN, 1.0)
     playout.time(RUN + 1.0, 5.0)  # came three seconds late
-    assert playout.time(RUN + 5.0, 6.0) == pytest.approx(RUN + 5.0 - _DELAY)
+    assert playout.time(RUN + 5.0, 6.0) == pytest.approx(RUN + 5.0 - _POSE_DELAY)

@@ -33,7 +33,7 @@ _MAX_LISTED_EVENTS = 200  # events that are put into words
 _AT_REST = '<div class="coneskin-card">No guard records a run: the arm is drawn at rest until one begins.</div>'
 
 
-_DELAY = 0.07  # s by which poses and bodies are late: a parcel of the recorder's, and the wait for the next
+_POSE_DELAY = 0.07  # s by which poses and bodies are late: a parcel of the recorder's, and the wait for the next
 _OFFSET_DRIFT = 0.01  # s for each second; by which the offset of the two clocks may shrink
 
 
@@ -63,7 +63,7 @@ class _Playout:
         if self._offset is not None:
             offset = max(offset, self._offset - _OFFSET_DRIFT * (now - self._looked))
         self._offset, self._looked = offset, now
-        return min(newest, now + offset - _DELAY)
+        return min(newest, now + offset - _POSE_DELAY)
 
 
 class LivePage:

@@ -22,8 +22,8 @@ from .traces import trace_drawings
 
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
-_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # times the recorded speed
-_SPEED_CHOICES = {f"{speed:g}x": speed for speed in _SPEEDS}
+_PLAYBACK_SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # times the recorded speed
+_SPEED_CHOICES = {f"{speed:g}x": speed for speed in _PLAYBACK_SPEEDS}
 _JUMP_EVENTS = frozenset(
     {EventName.CONTACT, EventName.STOPPING, EventName.STANDSTILL, EventName.RETREATING, EventName.RETREATED}
     | {EventName.LATCHED, EventName.FAULT, EventName.ACTIVATED, EventName.SPEED_REDUCED, EventName.STOP_FAILED}
