@@ -46,22 +46,14 @@ class TouchFilter:
 
     def restart(self) -> None:
         """Forget all matrices."""
+        self.begin(ContactMatrix(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
         self.frames = 0
-        self.values = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.share = self._ahead = 1.0
-        self.motion = self.velocity = (0.0, 0.0, 0.0)
-        self._s0 = self._s1 = self._s2 = 0.0
-        self._x0 = self._x1 = self._y0 = self._y1 = 0.0
-        self._smooth_x = self._smooth_y = self._ahead_x = self._ahead_y = 0.0
-        self._first_x = self._first_y = 0.0
 
     def begin(self, matrix: ContactMatrix) -> None:
         """Begin with a matrix."""
         self.frames, self.values = 1, matrix[:6]
-        self._s0, self._s1, self._s2 = 1.0, 0.0, 0.0
-        self._x0 = self._x1 = self._y0 = self._y1 = 0.0
-        self._smooth_x = self._smooth_y = self._ahead_x = self._ahead_y = 0.0
-        self._first_x, self._first_y = matrix.x, matrix.y
+        self._first, self._smooth, self._step = matrix[1:3], (0.0, 0.0), (0.0, 0.0)
+        self._sums = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # of ages^0, ^1, ^2; of x and y, alone and by age
         self.share = self._ahead = 1.0
         self.motion = self.velocity = (0.0, 0.0, 0.0)
 
@@ -84,9 +76,11 @@ class TouchFilter:
         moving_x, moving_y = self.motion[0], self.motion[2]
         if self.frames == 1:
             moving_x, moving_y = usual_x, usual_y
-        off_x, off_y = new_x - x - self._ahead_x, new_y - y - self._ahead_y
-        self._smooth_x = smooth_x = self._smooth_x + _SMOOTHING_GAIN * (off_x - self._smooth_x)
-        self._smooth_y = smooth_y = self._smooth_y + _SMOOTHING_GAIN * (off_y - self._smooth_y)
+        (step_x, step_y), (smooth_x, smooth_y), (first_x, first_y) = self._step, self._smooth, self._first
+        off_x, off_y = new_x - x - step_x, new_y - y - step_y
+        smooth_x += _SMOOTHING_GAIN * (off_x - smooth_x)
+        smooth_y += _SMOOTHING_GAIN * (off_y - smooth_y)
+        self._smooth = smooth_x, smooth_y
         alone, smooth = 1.0 + self._ahead, _SMOOTHED_VARIANCE + self._ahead
         if (
             off_x * off_x > _JUMPED_VARIANCE * (alone * xx + moving_x)
@@ -96,7 +90,7 @@ class TouchFilter:
         ):
             self.begin(matrix)
             return
-        self._add(new_x - self._first_x, new_y - self._first_y)
+        self._add(new_x - first_x, new_y - first_y)
         place_x, place_y = self._fit(xx, yy, usual_x, usual_y)
         frames = self.frames
         if frames < _MEMORY_FRAMES:
@@ -113,13 +107,10 @@ class TouchFilter:
 
     def _add(self, x: float, y: float) -> None:
         """Add a centre, as far as it is from the first, at time 0. All others become one frame older."""
-        kept = 1.0 if self._s0 < _MEMORY_FRAMES - 1.0 else 1.0 - 1.0 / _MEMORY_FRAMES
-        s0, s1 = self._s0, self._s1
-        self._s2 = kept * (self._s2 - 2.0 * s1 + s0)
-        self._s1 = kept * (s1 - s0)
-        self._s0 = kept * s0 + 1.0
-        self._x1, self._y1 = kept * (self._x1 - self._x0), kept * (self._y1 - self._y0)
-        self._x0, self._y0 = kept * self._x0 + x, kept * self._y0 + y
+        s0, s1, s2, x0, x1, y0, y1 = self._sums
+        kept = 1.0 if s0 < _MEMORY_FRAMES - 1.0 else 1.0 - 1.0 / _MEMORY_FRAMES
+        s0, s1, s2 = kept * s0 + 1.0, kept * (s1 - s0), kept * (s2 - 2.0 * s1 + s0)
+        self._sums = s0, s1, s2, kept * x0 + x, kept * (x1 - x0), kept * y0 + y, kept * (y1 - y0)
 
     def _fit(self, xx: float, yy: float, usual_x: float, usual_y: float) -> tuple[float, float]:
         """Return the centre now, and note its covariance and velocity.
@@ -128,20 +119,21 @@ class TouchFilter:
             xx, yy: noise of one frame's centre.
             usual_x, usual_y: variances of the velocity of what moves [sides per frame].
         """
-        share = 1.0 / self._s0
-        lag = -self._s1 * share  # frames from the mean time of them all
-        spread = self._s2 + self._s1 * lag
+        (s0, s1, s2, x0, x1, y0, y1), (first_x, first_y) = self._sums, self._first
+        share = 1.0 / s0
+        lag = -s1 * share  # frames from the mean time of them all
+        spread = s2 + s1 * lag
         by_noise = 1.0 / spread  # variance of the velocity, over that of one frame
-        mean_x, mean_y = self._x0 * share, self._y0 * share
-        step_x, step_y = (self._x1 + lag * self._x0) * by_noise, (self._y1 + lag * self._y0) * by_noise
+        mean_x, mean_y = x0 * share, y0 * share
+        step_x, step_y = (x1 + lag * x0) * by_noise, (y1 + lag * y0) * by_noise
         doubt_x, doubt_y = xx * by_noise, yy * by_noise
         odds = (1.0 + usual_x / doubt_x) * (1.0 + usual_y / doubt_y)
         seen = step_x * step_x / doubt_x + step_y * step_y / doubt_y
         moves = 1.0 if seen > 200.0 else 1.0 / (1.0 + math.sqrt(odds) * math.exp(-0.5 * seen))
-        self._ahead_x, self._ahead_y = moves * step_x, moves * step_y
+        self._step = moves * step_x, moves * step_y
         self.share = share + moves * lag * lag * by_noise
         self._ahead = share + moves * (lag + 1.0) * (lag + 1.0) * by_noise
         unsure = moves * (1.0 - moves) * lag * lag + moves * _PHASE_SKEW * _PHASE_SKEW
         self.motion = unsure * step_x * step_x, unsure * step_x * step_y, unsure * step_y * step_y
         self.velocity = (step_x, step_y, 0.0) if moves > _TOLD_CHANCE else (0.0, 0.0, 0.0)
-        return self._first_x + mean_x + moves * lag * step_x, self._first_y + mean_y + moves * lag * step_y
+        return first_x + mean_x + moves * lag * step_x, first_y + mean_y + moves * lag * step_y
