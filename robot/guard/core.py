@@ -160,9 +160,7 @@ class GuardCore:
         for detector in self._stream.detectors:
             name, fault, age = detector.sensor.name, detector.fault, detector.age(now)
             if age == math.inf:
-                blockers.append(
-                    f"{name}: waits for its first valid frame; if none comes, check power and cable"
-                )
+                blockers.append(f"{name}: waits for its first valid frame; if none comes, check power and cable")
             elif age > self._limits.skin_silence:
                 blockers.append(f"{name}: no valid frame" + (f" ({fault.value})" if fault else ""))
             elif detector.touched:

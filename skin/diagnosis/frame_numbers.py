@@ -21,7 +21,7 @@ _CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
 _HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
 _LOST_SHARE = 0.02  # share of frames
 _REPEATED_SHARE, _UNCOUNTED_SHARE = 0.01, 0.01  # a guard stops at each
-_FEW = 3  # frames that may be chance
+_CHANCE_FRAMES = 3  # frames that may be chance
 _LINE_TURNS = 3
 _TIME_PARTS = 6  # of the time, in each of which some frame is quick
 _MIN_TIME = 0.25  # s over which the clocks can be compared
@@ -109,7 +109,7 @@ def _find_repeats(frames: Sequence[Frame]) -> Finding | None:
     same = sum(a[4:6] == b[4:6] for a, b in itertools.pairwise(frames))
     if len({frame[4:6] for frame in frames}) == 1 and len(set(frames)) > 1:
         return None  # neither sequence nor clock is ever written
-    if same >= max(_FEW, _REPEATED_SHARE * pairs):
+    if same >= max(_CHANCE_FRAMES, _REPEATED_SHARE * pairs):
         return Cause.REPEATED.found(f"{same} of {pairs} frames are the one before once more")
     return None
 
@@ -164,7 +164,7 @@ def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameN
     steps = zip(_sequence_steps(frames), ticks, strict=True)
     left_out = [tick / period for step, tick in steps if step == 1 and tick > 1.5 * period]
     even = sum(abs(count - round(count)) < 0.2 for count in left_out)
-    if even >= max(_FEW, _UNCOUNTED_SHARE * len(ticks), 0.8 * len(left_out)):
+    if even >= max(_CHANCE_FRAMES, _UNCOUNTED_SHARE * len(ticks), 0.8 * len(left_out)):
         return Cause.UNCOUNTED.found(f"before {even} of {len(ticks)} frames there is time for others, and no number")
     uneven = sum(abs(tick - period) > 0.5 * period + 2e3 for tick in ticks)
     if uneven > 0.1 * len(ticks):

@@ -36,9 +36,10 @@ class ServedPlant(RemotePlant):
     """A plant at the other end of a channel, which answers after each cycle: in lock-step."""
 
     def __init__(self) -> None:
+        served = physics()  # first: where it skips, nothing is open yet
         ours, theirs = pair()
         super().__init__(Channel(ours), START, arm_model("UR5e"))
-        self._other, self._served = Channel(theirs), physics()
+        self._other, self._served = Channel(theirs), served
 
     def update(self, q: Sequence[float], qd: Sequence[float]) -> PlantState:
         state = super().update(q, qd)
