@@ -32,7 +32,7 @@ UNFIT = {"journal", "deadman", "protocol"}
 PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
 PREPARATION |= {"inverse_kinematics"}
 PROCESSES = {"backup_stop", "guard_watchdog", "driver", "driver_process", "examination", "input_writers"}
-PROCESSES |= {"model_check", "program_io", "rtde_connection", "state_reader", "stop_sockets", "tcp", "ur_rtde"}
+PROCESSES |= {"model_check", "program_io", "rtde_connection", "stop_sockets", "tcp", "ur_rtde"}
 PURE = UNFIT | PREPARATION | PROCESSES
 
 packages, package_dir = find_packages(str(ROOT / "src")), {"": "src"}

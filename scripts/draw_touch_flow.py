@@ -100,7 +100,7 @@ def drawing() -> str:
         arrow(STOP, (855, 425), (903, 425)),
         # states, heartbeats, records
         arrow(OTHER, (905, 250), (532, 250)),
-        text(538, 243, "states, 500 Hz: robot/ur/state_reader.py", "small"),
+        text(538, 243, "states, 500 Hz: robot/ur/rtde_connection.py", "small"),
         arrow(OTHER, (530, 130), (668, 130), dashed=True),
         text(538, 146, "heartbeat", "small"),
         arrow(OTHER, (530, 465), (668, 465), dashed=True),

@@ -103,7 +103,7 @@ HOT = {
     "signals/contact signals/journal",
     "robot/guard/motion": "motion_away setpoint_stream",
     "robot/stop": "arm_stop state_age stop_monitor",
-    "robot/ur": "driver_process state_reader ur_rtde",
+    "robot/ur": "driver_process rtde_connection ur_rtde",
 }
 
 MOST_LINES = 500  # of a file

@@ -170,7 +170,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
             "coneskin.robot.guard.motion.setpoint_stream",
             "coneskin.robot.ur.rtde_codec",
             "coneskin.robot.ur.input_writers",
-            "coneskin.robot.ur.state_reader",
+            "coneskin.robot.ur.rtde_connection",
         },
     ),
 }
@@ -192,7 +192,7 @@ def test_what_is_not_named_is_not_loaded(case: str, tmp_path: Path, a_run: str) 
 
 
 def test_a_scene_without_an_arm_loads_no_kinematics_and_no_reaction(tmp_path: Path) -> None:
-    unneeded = {"arm.models", "reaction.retreat", "guard.arm_supervisor", "ur.state_reader"}
+    unneeded = {"arm.models", "reaction.retreat", "guard.arm_supervisor", "ur.rtde_connection"}
     unneeded |= {"arm.kinematics", "ur.rtde_codec"}
     assert not known({f"coneskin.robot.{name}" for name in unneeded}) & modules(
         _NO_TOUCH, _BUILD, tmp_path / "scene.toml", ""

@@ -107,8 +107,8 @@ def test_an_arm_that_does_not_move_is_no_measurement(tmp_path):
         assert not json.loads((tmp_path / "m.json").read_text())["complete"]
 
 
-def compare(found, limits):
-    return measured.compare(found, limits.escalate, limits.stop_budget)
+def compare(found, limits, watchdog_hz=4.0):
+    return measured.compare(found, limits.escalate, limits.stop_budget, watchdog_hz)
 
 
 def facts(**change):
@@ -138,6 +138,9 @@ def test_limits_follow_what_was_measured(tmp_path):
     assert [f.verdict for f in found] == ["ok", "bad", "warning"]
     assert found[1].remedy.startswith("escalate_ms = 360 in [monitoring]")
     assert compare(read(tmp_path, facts(start_s=slow)), MonitoringLimits(escalate=0.36))[1].verdict == "ok"
+    late = read(tmp_path, facts(watchdog_s={"n": 1, "p50": 0.05, "p95": 0.05, "worst": 0.05}))
+    assert compare(late, MonitoringLimits())[2].remedy.startswith("watchdog_hz = 5 in [arm]")
+    assert compare(late, MonitoringLimits(), 5.0)[2].verdict == "ok"
     late = facts()
     late["stops"][0]["stands_s"] = slow | {"worst": 0.5}
     assert [f.item for f in compare(read(tmp_path, late), MonitoringLimits())][-1] == "measured, stop"

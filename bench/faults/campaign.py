@@ -32,7 +32,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from .kind import FaultKind
-from .kinds_peer import CONTROLLER_KINDS, DRIVER_KINDS, NETWORK_KINDS, SKIN_KINDS
+from .kinds_peer import CONTROLLER_KINDS, DRIVER_KINDS, NETWORK_KINDS, SKIN_KINDS, SWITCH_KINDS
 from .kinds_process import PROCESS_KINDS, PROGRAM_KINDS
 from .kinds_reaction import CONTACT_KINDS, REACTION_KINDS
 from .setup import CLOCK, Outcome
@@ -45,6 +45,7 @@ KINDS: tuple[FaultKind, ...] = (
     *SKIN_KINDS,
     *CONTROLLER_KINDS,
     *NETWORK_KINDS,
+    *SWITCH_KINDS,
     *PROCESS_KINDS,
     *PROGRAM_KINDS,
     *CONTACT_KINDS,

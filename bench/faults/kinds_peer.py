@@ -7,6 +7,7 @@ is the driver, on the other end of its reverse interface. To the guard the motio
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 from .kind import (
@@ -34,7 +35,7 @@ from .kind import (
     wires,
 )
 from .setup import ARM_SILENCE, SKIN_SILENCE, STUCK_FRAMES, Setup
-from .trial import Trial
+from .trial import MOTIONS, Trial
 
 SKIN_KINDS = (
     # nothing but a touch: the campaign's own baseline
@@ -156,6 +157,49 @@ NETWORK_KINDS = (
     ),
     away("network cut", CUT_NETWORK_SAID, WATCHDOG_TIME, after=restore),
     slow("network cut", CUT_NETWORK_SAID, ARM_SILENCE + WATCHDOG_TIME, INTERNAL, after=restore),
+)
+
+
+SWITCH_TIME = 0.3  # s in which the guard sees a switch to local control
+REQUIRED = 'controller_heartbeat = "required"'
+
+
+def switch(t: Trial) -> float:
+    """Switch to local control."""
+    t.happened = t.controller("local control")
+    return t.happened
+
+
+def switch_and_touch(t: Trial) -> float:
+    """Switch to local control, and touch the skin soon after; time runs from the switch."""
+    at = switch(t)
+    time.sleep(0.2 * t.rng.random())
+    t.touch()
+    return at
+
+
+def switched(mover: str, how: str, controls: tuple[str, ...] = EXTERNAL) -> list[FaultKind]:
+    """Return the kinds of a switch to local control in one motion: alone, and just before a touch."""
+    slack = SWITCH_TIME + WATCHDOG_TIME + FEW_FRAMES_TIME  # a servoj has nothing but the controller's watchdog
+    setup = Setup(reaction='kind = "stop"', arm=REQUIRED if mover in MOTIONS else "", mover=mover)
+    return [
+        FaultKind(f"local control in {how}", switch, slack, setup=setup, controls=controls),
+        FaultKind(
+            f"local control in {how}, then a touch",
+            switch_and_touch,
+            slack,
+            setup=setup,
+            touched=True,
+            controls=controls,
+        ),
+    ]
+
+
+#: a person switches the pendant to local control while the arm moves: the slider and the controller's watchdog are left
+SWITCH_KINDS = (
+    *switched("", "the guard's own move_j", controls=INTERNAL),
+    *(kind for mover in MOTIONS for kind in switched(mover, mover.removeprefix("in ").replace("heartbeat", "movej"))),
+    *switched("loop 20", "a loop of ur_rtde"),
 )
 
 

@@ -81,9 +81,9 @@ class Setup:
         sheets: model of the skin's sheets; a ladder is shorted out by a contact at each end.
         skins: sensors: on the forearm, and on the upper arm.
         arm: more lines of [arm].
-        mover: what moves an externally controlled arm: "" for one program, "heartbeat" for one that ends where the
-            guard is gone, "driver servoj" or "driver speedj" for bench/faults/external_control_peer.py, or arguments of
-            bench/faults/restarter.py.
+        mover: what moves an externally controlled arm: "" for one program, "heartbeat", "in servoj" and so on
+            (trial.MOTIONS) for one that ends where the guard is gone, "driver servoj" or "driver speedj" for
+            bench/faults/external_control_peer.py, or arguments of bench/faults/restarter.py.
         manners: of the program, words of bench/faults/program.py.
         files: that lie in the program's current folder: name -> text.
     """

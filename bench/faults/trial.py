@@ -102,6 +102,22 @@ class Child:
         return ended
 
 
+#: mover -> its lines of URScript, after those of `coneskin heartbeat`; each turns the base, for 2 s or more
+MOTIONS = {
+    "heartbeat": f"movej({GOAL}, a={ACCELERATION}, v={SPEED})",
+    "in speedj": f"speedj([{SPEED}, 0, 0, 0, 0, 0], {ACCELERATION}, 3)",
+    "in movel": "movel(pose_add(get_target_tcp_pose(), p[0, -0.75, 0, 0, 0, 0]), a=2, v=0.35)",
+    "in speedl": "speedl([0, -0.35, 0, 0, 0, 0], 2, 2.2)",
+    "in servoj": f"""q = get_target_joint_positions()
+  v = 0.0
+  while True:
+    if v < {SPEED}:
+      v = v + {ACCELERATION} * get_steptime()
+    end
+    q[0] = q[0] + v * get_steptime()
+    servoj(q, 0, 0, get_steptime(), 0.05, 500)
+  end""",
+}
 EXTERNAL_CONTROL = "CONESKIN_EXTERNAL_CONTROL"  # environment variable: path of external_control.urscript
 
 
@@ -284,10 +300,8 @@ class Trial:
         self.motion = self._stack.enter_context(ArmMotion(self.host))
         if self.control == "internal":
             self.program.say(go=True)
-        elif self.setup.mover == "heartbeat":
-            self.send_script(
-                f"def bench_move():\n{self._heartbeat()}\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n"
-            )
+        elif self.setup.mover in MOTIONS:
+            self.send_script(f"def bench_move():\n{self._heartbeat()}\n  {MOTIONS[self.setup.mover]}\nend\n")
         elif self.setup.mover.startswith("driver"):
             how = self.setup.mover.split()[1]
             script, start = os.environ[EXTERNAL_CONTROL], json.dumps(START)
@@ -301,10 +315,13 @@ class Trial:
             words = self.setup.mover.split()
             self.mover = Child("-m", "bench.faults.restarter", self.host, json.dumps(GOAL), *words)
             self._stack.callback(self.mover.close)
-        if self.control == "external" and not self.setup.mover.startswith(("heartbeat", "loop", "driver")):
+        if self.control == "external" and not self.setup.mover.startswith((*MOTIONS, "loop", "driver")):
             self.send_script(f"def bench_move():\n  movej({GOAL}, a={ACCELERATION}, v={SPEED})\nend\n")
         end = CLOCK() + 10.0
-        while abs(self.simulated.state()["qd"][0]) < 0.95 * SPEED:
+        while (
+            abs(self.simulated.state()["qd"][0])
+            < (0.5 if self.setup.mover in ("in movel", "in speedl") else 0.95) * SPEED
+        ):
             if CLOCK() > end:
                 raise RuntimeError(f"the arm does not move: {self.program.hear(0.0)}")
             time.sleep(0.005)

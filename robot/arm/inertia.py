@@ -24,6 +24,7 @@ Sources of the table:
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -35,6 +36,7 @@ from .model import ArmModel, Joints
 from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
 
+_HELD_SHARE = 1.25  # of its highest torque, that a joint at rest withstands by friction; fitted to the UR5's elbow
 #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 GRAVITY = 9.82
 
@@ -141,6 +143,21 @@ def joint_torques(
         about = minus(turned, cross(poses[i].translation, carried))
         torques[i] = dot(poses[i].rotate((0.0, 0.0, 1.0)), about) + inertia.rotor[i] * qdd[i]
     return torques
+
+
+def highest_acceleration(
+    model: ArmModel, inertia: ArmInertia, q: Sequence[float], qd: Sequence[float], direction: Sequence[float]
+) -> float:
+    """Return the highest acceleration along a direction, whose greatest number is 1 [rad/s^2]; see `joint_torques`."""
+    still = joint_torques(model, inertia, q, qd, (0.0,) * model.joints)
+    found = math.inf
+    for along, limit, torque, moved in zip(
+        direction, inertia.torque, still, joint_torques(model, inertia, q, qd, direction), strict=True
+    ):
+        most, slope = limit if along else _HELD_SHARE * limit, moved - torque
+        if slope:
+            found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
+    return found
 
 
 def _columns(rows: Tensor) -> Tensor:
@@ -311,19 +328,12 @@ def _torque(large: float, elbow: float, wrist: float) -> Joints:
 #: highest torque of base and shoulder, elbow, wrists [N m]
 _JOINT_TORQUES = {
     "UR3": _torque(56.0, 28.0, 12.0),
-    "UR5": _torque(150.0, 150.0, 28.0),
     "UR10": _torque(330.0, 150.0, 56.0),
     "UR3e": _torque(54.0, 28.0, 9.0),
-    "UR5e": _torque(150.0, 150.0, 28.0),
-    "UR7e": _torque(150.0, 150.0, 28.0),
-    "UR8 Long": _torque(433.0, 204.0, 70.0),
-    "UR10e": _torque(330.0, 150.0, 54.0),
-    "UR12e": _torque(330.0, 150.0, 54.0),
-    "UR15": _torque(433.0, 204.0, 70.0),
-    "UR18": _torque(433.0, 204.0, 70.0),
-    "UR16e": _torque(330.0, 150.0, 54.0),
-    "UR20": _torque(738.0, 433.0, 107.0),
-    "UR30": _torque(738.0, 433.0, 107.0),
+    **dict.fromkeys(("UR5", "UR5e", "UR7e"), _torque(150.0, 150.0, 28.0)),
+    **dict.fromkeys(("UR10e", "UR12e", "UR16e"), _torque(330.0, 150.0, 54.0)),
+    **dict.fromkeys(("UR8 Long", "UR15", "UR18"), _torque(433.0, 204.0, 70.0)),
+    **dict.fromkeys(("UR20", "UR30"), _torque(738.0, 433.0, 107.0)),
 }
 
 
@@ -347,7 +357,5 @@ def _inertia(name: str) -> ArmInertia:
         LinkInertia(mass, centre, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
         for mass, centre, (xx, xy, xz, yy, yz, zz) in _LINK_TABLE[name]
     )
-    a, b, c, d, e, f = torque = _JOINT_TORQUES[name]
-    per = _ROTOR_PER_TORQUE
-    rotor = (per * a, per * b, per * c, per * d, per * e, per * f)
-    return ArmInertia(links, torque, rotor)
+    torque = _JOINT_TORQUES[name]
+    return ArmInertia(links, torque, tuple(_ROTOR_PER_TORQUE * value for value in torque))

@@ -28,6 +28,7 @@ class ExaminationScope(NamedTuple):
     slider: bool  #: the guard takes the speed slider
     setpoints: bool  #: the guard moves the arm away although another program moves it
     heartbeat: bool  #: a program on the controller may depend on the guard's heartbeat
+    deceleration: float = 10.0  #: of its stops [rad/s2]
 
 
 class _Connection(Protocol):

@@ -128,6 +128,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _serve(args: argparse.Namespace) -> int:
+    if args.programs and not args.programs.is_dir():
+        raise RobotRefused(f"--programs must be a folder, got {args.programs}")
     options = Options(
         model=args.model,
         version=_version(args.version),
@@ -136,7 +138,7 @@ def _serve(args: argparse.Namespace) -> int:
         unlock_after=_time("--unlock-after-s", args.unlock_after_s, 3_600),
         after_protective_stop=args.protective_stop,
         program=_read(args.program) if args.program else "",
-        programs=_folder(args.programs) if args.programs else None,
+        programs=args.programs,
         external_control=_address(args.external_control),
         remote_control=args.control != "local",
         remote_enabled=args.control != "disabled",
@@ -239,12 +241,6 @@ def _plant(descriptor: int, options: Options) -> RemotePlant:
         return RemotePlant(Channel(socket.socket(fileno=descriptor)), options.start_q, arm_model(options.model))
     except OSError as exc:
         raise RobotRefused(f"--plant-descriptor {descriptor} is no line to a plant: {exc.strerror}") from exc
-
-
-def _folder(path: Path) -> Path:
-    if not path.is_dir():
-        raise RobotRefused(f"--programs must be a folder, got {path}")
-    return path
 
 
 def _address(text: str) -> tuple[str, int]:

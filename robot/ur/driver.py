@@ -14,7 +14,7 @@ from coneskin.robot.driver.protocol import ArmDriver, ExaminationScope
 from coneskin.robot.driver.values import StopPath
 
 from .rtde_codec import decode_state
-from .state_reader import StateReader
+from .rtde_connection import StateReader
 from .stop_sockets import StopSockets
 
 if TYPE_CHECKING:

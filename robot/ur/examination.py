@@ -12,24 +12,27 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from itertools import pairwise
+from typing import Any
 
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.core.finding import Finding, Verdict
+from coneskin.robot.arm.inertia import arm_inertia, highest_acceleration, loaded
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.protocol import ExaminationScope
 
 from .input_writers import HEARTBEAT_INPUTS, SETPOINT_INPUTS, SLIDER_INPUTS
 from .model_check import check_model, read_pose
 from .rtde_codec import decode_state
-from .rtde_connection import RtdeConnection
-from .state_reader import StateReader
+from .rtde_connection import RtdeConnection, StateReader
 from .stop_sockets import StopSockets
 
 _REPLY_TIMEOUT = 1.5  # s for connecting, and for each reply
 _LISTEN_TIME = 1.0  # s of states
 _MAX_LATENESS, _MAX_GAP = 1.25, 0.025  # times the control cycle, of the median between two states; s, of the longest
+_STRETCHED = (0.0,) * 6  # rad; where a joint carries most
 _CB3_MAJOR = 3  # major version of its software, which has a cycle of 8 ms and no local control
 _CONTROL_INPUTS = ("input_int_register_0", *(f"input_double_register_{number}" for number in range(6)))  # of ur_rtde
 _FREE_REMEDY = (
@@ -50,19 +53,15 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
             major, minor = connection.ask_version()
     except ConeSkinError as exc:
         rest = ("model", "state", "registers", "latency", "stops")
+        wanted, remedy = f"{host}:{RtdeConnection.port} answers", "for a simulated one: coneskin sim-ur"
         return [
-            Finding(
-                "arm, RTDE",
-                "bad",
-                str(exc),
-                f"{host}:{RtdeConnection.port} answers",
-                "for a simulated one: coneskin sim-ur",
-            ),
+            Finding("arm, RTDE", "bad", str(exc), wanted, remedy),
             *(Finding(f"arm, {item}", "not tried", "no controller answers") for item in rest),
         ]
     found = [Finding("arm, RTDE", "ok", f"{host}:{RtdeConnection.port} answers, software {major}.{minor}")]
     found += _tried("arm, model", lambda: _model(arm, host))
     found += _tried("arm, state", lambda: list(_state(host, 0.008 if major == _CB3_MAJOR else 0.002)))
+    found += _tried("arm, braking", lambda: _braking(arm, host, scope.deceleration))
     found += _tried("arm, stops", lambda: _stops(host))
     found += list(_registers(host, scope))
     return found
@@ -86,15 +85,30 @@ def _model(arm: ArmModel, host: str) -> list[Finding]:
     return [Finding("arm, model", "ok", f"the flange is where a {arm.name} has it")]
 
 
+def _braking(arm: ArmModel, host: str, wanted: float) -> list[Finding]:
+    """Compare a stop's deceleration [rad/s2] with the arm's motors, stretched out with the payload that it is told."""
+    payload: Any = 0.0
+    with RtdeConnection(host, _REPLY_TIMEOUT) as connection, suppress(RobotRefused):  # an old one does not tell it
+        recipe = connection.ask_outputs(("payload",))
+        connection.start()
+        (payload,) = recipe.unpack(connection.wait_data(_REPLY_TIMEOUT))
+    inertia, still = loaded(arm_inertia(arm), payload, (0.0, 0.0, 0.0)), (0.0,) * 6
+    directions = [[sign * float(i == joint) for i in range(6)] for joint in range(6) for sign in (1.0, -1.0)]
+    held = min(highest_acceleration(arm, inertia, _STRETCHED, still, direction) for direction in directions)
+    value = f"stretched out with {payload:g} kg, its motors brake with {held:.1f} rad/s2"
+    remedy = (
+        f"deceleration_rad_s2 = {max(0.5, held):.1f} in [reaction]; else such a stop takes longer than the guard allows"
+    )
+    fits = held >= wanted
+    return [Finding("arm, braking", "ok" if fits else "warning", value, f"{wanted:g} rad/s2", "" if fits else remedy)]
+
+
 def _stops(host: str) -> list[Finding]:
     """Prove the stop paths as a guard does at its start."""
     start = time.monotonic()
     with StopSockets(host, _REPLY_TIMEOUT):
-        return [
-            Finding(
-                "arm, stops", "ok", f"programs and commands are taken, in {1e3 * (time.monotonic() - start):.0f} ms"
-            )
-        ]
+        value = f"programs and commands are taken, in {1e3 * (time.monotonic() - start):.0f} ms"
+        return [Finding("arm, stops", "ok", value)]
 
 
 def _state(host: str, cycle: float) -> Iterator[Finding]:

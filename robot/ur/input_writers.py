@@ -26,8 +26,7 @@ from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram
 
 from . import rtde_codec as rtde
-from .rtde_connection import RtdeConnection
-from .state_reader import StateReader
+from .rtde_connection import RtdeConnection, StateReader
 
 _OUTPUT_FREQUENCY = 50.0  # Hz; enough to know where a person has put the slider
 

@@ -1,16 +1,20 @@
-"""RTDE connection to a controller: set-up with a time limit, then data without waiting.
+"""RTDE connection to a controller: set-up with a time limit, then data without waiting; and the reader of its state.
 
-Its users decide what is read and written: ``state_reader``, ``input_writers``, ``program_io``, ``model_check``.
+Its users decide what is read and written: ``input_writers``, ``program_io``, ``model_check``. The wheel's receive
+interface needs a thread, keeps the interpreter's lock while it connects and goes on returning old values for 2.5 s when
+the controller freezes. The reader is one socket in the guard's own loop, and each state carries its time.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from typing import Self
 
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
 from coneskin.robot.driver.tcp import TcpReader
+from coneskin.robot.driver.values import ControllerState
 
 from . import rtde_codec as rtde
 
@@ -147,3 +151,36 @@ class RtdeConnection(TcpReader):
                 f"the controller {self.host}:{self.port} is gone: {exc.strerror or exc}; {self.advice}"
             ) from exc
         return reply
+
+
+class StateReader(RtdeConnection):
+    """Reader of the controller's state; open it in a ``with``.
+
+    Args:
+        host: the controller.
+        timeout: how long connecting and each reply may take [s].
+        clock: monotonic seconds.
+
+    Raises:
+        RobotConnectionError: on entering, where the controller cannot be reached or refuses.
+        RobotTimeout: on entering, where it does not answer.
+    """
+
+    def __enter__(self) -> Self:
+        super().__enter__()
+        self._ask_for()
+        self.start()
+        return self
+
+    def wait(self, timeout: float) -> ControllerState:
+        """Wait for the next state, for scripts and set-up; the guard's loop uses ``fileno`` and ``read``.
+
+        Raises:
+            RobotTimeout: none came within the timeout [s].
+            RobotConnectionError: the controller is gone.
+        """
+        return rtde.decode_state(self._clock(), self.wait_data(timeout))
+
+    def _ask_for(self) -> None:
+        """Ask for the variables before the data flows."""
+        self.ask_outputs(rtde.STATE_RECIPE.names)

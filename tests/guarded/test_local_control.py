@@ -19,19 +19,6 @@ from .test_cut_network import MOVES  # noqa: E402
 from .test_external_control import send  # noqa: E402
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("control", ["internal", "external"])
-def test_a_guard_does_not_start_on_a_controller_in_local_control(control):
-    with (
-        SimulatedController(
-            model="UR5e", host=free_host(), start_q=START, options=("--control", "local")
-        ) as controller,
-        pytest.raises(RobotRefused, match=r"local control: it refuses every stop .* Choose Remote Control"),
-        guard(scene_for(controller, control=control)),
-    ):
-        pass
-
-
 @pytest.mark.promise("P24")
 @pytest.mark.long
 def test_a_switch_to_local_control_stops_the_arm_and_says_why():
@@ -57,6 +44,23 @@ SERVO = """  q = get_actual_joint_positions()
   end
 end
 """
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("control", ["internal", "external"])
+@pytest.mark.parametrize("program", ["", MOVES, SERVO])
+def test_a_guard_does_not_start_on_a_controller_in_local_control(control, program):
+    """Whatever moves the arm, and a servoj without the heartbeat's lines, which nothing would stop there."""
+    with SimulatedController(model="UR5e", host=free_host(), start_q=START) as controller:
+        if program:
+            send(controller.host, 30002, f"def users():\n  {program}")
+            until(lambda: any(controller.state()["qd"]))
+        controller.call("local control")
+        with (
+            pytest.raises(RobotRefused, match=r"local control: it refuses every stop .* Choose Remote Control"),
+            guard(scene_for(controller, control=control)),
+        ):
+            pass
 
 
 @pytest.mark.promise("P24")

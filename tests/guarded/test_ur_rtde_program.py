@@ -11,7 +11,7 @@ import pytest
 
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.models import arm_model
-from coneskin.robot.ur.state_reader import StateReader
+from coneskin.robot.ur.rtde_connection import StateReader
 from coneskin.testing.scenes import START
 
 pytestmark = pytest.mark.long

@@ -21,10 +21,9 @@ from typing import Protocol
 
 from coneskin.core.errors import RobotRefused
 from coneskin.geometry.pose import Pose
-from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded
+from coneskin.robot.arm.inertia import arm_inertia, highest_acceleration, joint_torques, loaded
 from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.sim.urscript.values import solve_linear
 
 from .plant import KinematicPlant, PlantState
@@ -74,7 +73,6 @@ _SPEED_MARGIN = 1.01  # share of its highest speed at which the safety system st
 _EASY_ACCELERATION = 5.0  # rad/s^2, of every joint; what no arm's motors lack the torque for: it is not worked out
 _HARDEST_BRAKING = 50.0  # rad/s^2 of the leading joint; an assumption for arms without a load
 _WEAKEST_BRAKING = 0.5  # rad/s^2 of a joint whose motor has no torque left; a real one would sag
-_HELD_SHARE = 1.25  # of its highest torque, that a joint at rest withstands by friction; fitted to the UR5's elbow
 _FADING_POWER = 1.0 / 3.0  # of speed over highest speed, with which a stop of category 0 softens; fitted
 _LEAST_SHARE = 1e-3  # of a joint's highest speed; below, a stop softens no further
 _MAX_PAYLOAD, _MAX_PAYLOAD_LEVER = 100.0, 2.0  # kg, m; a payload beyond is none of an arm, and is not simulated
@@ -259,19 +257,8 @@ class SimulatedArm:
                 raise MotionFault(_deviation(i), detail)
 
     def feasible_acceleration(self, direction: Sequence[float]) -> float:
-        """Return the highest acceleration along a direction of the joints for which their motors have the torque.
-
-        Args:
-            direction: of the six joints; where the greatest of them is 1, the result is in rad/s^2.
-        """
-        still = joint_torques(self.model, self.inertia, self.q, self.qd, ZERO_VELOCITY)
-        moved = joint_torques(self.model, self.inertia, self.q, self.qd, direction)
-        found = MAX_ACCELERATION
-        for along, limit, torque, with_it in zip(direction, self.inertia.torque, still, moved, strict=True):
-            most, slope = limit if along else _HELD_SHARE * limit, with_it - torque
-            if slope:
-                found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
-        return found
+        """Return the highest acceleration in a direction for which the motors have the torque."""
+        return min(MAX_ACCELERATION, highest_acceleration(self.model, self.inertia, self.q, self.qd, direction))
 
     # tool
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import shlex
 import sys
 import time
@@ -80,8 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if args.measured:
         from coneskin.robot.ur.measured import compare, read_measured
 
-        limits = scene.monitoring_limits
-        doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget))
+        limits, hz = scene.monitoring_limits, scene.arm.watchdog_hz if scene.arm else math.inf
+        doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget, hz))
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
     code = 1 if any(finding.verdict == "bad" for finding in doctor.findings) else 0

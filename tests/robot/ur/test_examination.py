@@ -1,12 +1,14 @@
 """Examination of a controller, against the simulated one: what another client holds, and what is not there."""
 
+import socket
+
 import pytest
 
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import ExaminationScope
 from coneskin.robot.sim.process import free_host
-from coneskin.robot.ur.examination import examine
+from coneskin.robot.ur.examination import _braking, examine
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from tests.support.served_controller import served
 
@@ -30,6 +32,17 @@ def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
         found = examine(arm_model("UR5e"), simulated.host, ALL)
         assert {name for name, verdict in verdicts(found).items() if verdict not in ("ok", "warning")} == set()
         assert verdicts(found).keys() >= {"RTDE", "model", "power", "safety", "stops", "latency"}
+        assert {one.item: one for one in found}["arm, braking"].value.startswith(
+            "stretched out with 0 kg, its motors brake"
+        )
+        with socket.create_connection((simulated.host, 30002), timeout=5) as scripts:
+            scripts.sendall(b"sec carries():\n  set_payload(5)\nend\n")
+        while "with 5 kg" not in (braking := _braking(arm_model("UR5e"), simulated.host, 10.0)[0]).value:
+            pass
+        assert (braking.verdict, braking.remedy[:28]) == (
+            "warning",
+            "deceleration_rad_s2 = 6.6 in",
+        )  # as bench deceleration
         held = ["input_int_register_0", "speed_slider_mask", "speed_slider_fraction"]
         with RtdeConnection(simulated.host) as other:
             other.ask_inputs(held)

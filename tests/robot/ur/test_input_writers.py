@@ -17,8 +17,7 @@ from coneskin.robot.ur.input_writers import (
     program_text,
     set_slider,
 )
-from coneskin.robot.ur.rtde_connection import RtdeConnection
-from coneskin.robot.ur.state_reader import StateReader
+from coneskin.robot.ur.rtde_connection import RtdeConnection, StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.robot.sim.machine.test_controller import Bench
 from tests.support.served_controller import served

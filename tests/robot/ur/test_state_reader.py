@@ -14,8 +14,7 @@ from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur import rtde_codec
 from coneskin.robot.ur.program_io import _SAFETY_MODES
 from coneskin.robot.ur.rtde_codec import STATE_RECIPE, decode_state
-from coneskin.robot.ur.rtde_connection import RtdeConnection
-from coneskin.robot.ur.state_reader import StateReader
+from coneskin.robot.ur.rtde_connection import RtdeConnection, StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.support.served_controller import served
 

@@ -236,7 +236,9 @@ def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
     internal = arm.control == "internal"
     moves = scene.moves_away and not internal
     slows = "slow" in {scene.default_reaction.kind, *(rule.reaction.kind for rule in scene.rules)}
-    scope = ExaminationScope(internal, arm.slider_stop or slows, moves, not internal)
+    scope = ExaminationScope(
+        internal, arm.slider_stop or slows, moves, not internal, scene.default_reaction.deceleration
+    )
     model = arm_model(arm.model)
     driver = load_driver(model.driver)
     if isinstance(driver, ExaminedDriver):
