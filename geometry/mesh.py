@@ -17,7 +17,7 @@ import numpy as np
 
 from coneskin.core.arrays import Bools, Floats, Ints, frozen
 from coneskin.core.errors import MeshError, MissingExtra
-from coneskin.core.files import read_file
+from coneskin.core.files import explain_os_error, read_file
 
 from .pose import Pose
 
@@ -33,9 +33,6 @@ def _outermost_points(points: Floats) -> Floats:
         return np.asarray(points[np.sort(ConvexHull(points).vertices)])
     except QhullError:
         return points
-
-
-_MAX_UNIT_DEPTH = 3  # elements within each other down to the unit: COLLADA, asset, unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,22 +57,13 @@ def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
         MeshError: malformed XML, or a unit that is no length.
     """
     asset = _ColladaAsset()
-    within: list[str] = []
     try:
-        for event, element in ElementTree.iterparse(io.BytesIO(data), ("start", "end")):
-            if event == "start":
-                within.append(element.tag.rpartition("}")[2])
-                continue
-            # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
-            # a deep document would be copied at each of its ends
-            inside = within[1:] if len(within) <= _MAX_UNIT_DEPTH else []
-            within.pop()
-            if inside == ["asset", "unit"]:
-                asset = replace(asset, unit=element.get("name", "unit"), metres=float(element.get("meter", "1")))
-            elif inside == ["asset", "up_axis"]:
-                asset = replace(asset, up_axis=(element.text or asset.up_axis).strip())
-            elif inside == ["asset"]:
-                break
+        root = ElementTree.fromstring(data)
+        # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
+        if (unit := root.find("{*}asset/{*}unit")) is not None:
+            asset = replace(asset, unit=unit.get("name", "unit"), metres=float(unit.get("meter", "1")))
+        if (up_axis := root.find("{*}asset/{*}up_axis")) is not None:
+            asset = replace(asset, up_axis=(up_axis.text or asset.up_axis).strip())
     except ElementTree.ParseError as error:
         raise MeshError(f"{path}: malformed XML: {error}") from error
     except ValueError as error:
@@ -197,10 +185,8 @@ def load_mesh(path: str | Path, unit: str | None = None, scale: tuple[float, flo
     path = Path(path)
     if unit is not None and unit not in UNITS:
         raise MeshError(f"unit must be one of {', '.join(UNITS)}, got {unit!r}")
-    try:
+    with explain_os_error(MeshError, str(path)):
         data = read_file(path, MAX_SIZE)
-    except OSError as exc:
-        raise MeshError(f"{path}: {exc.strerror or exc}") from exc
     if path.suffix.lower() not in SUFFIXES:
         raise MeshError(f"{path}: a mesh is read from {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}")
     if not data:

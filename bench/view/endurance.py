@@ -22,8 +22,7 @@ from pathlib import Path
 from bench.report import head
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
-from coneskin.view.live_page import LivePage
-from coneskin.view.live_run import LiveRun
+from coneskin.view.live_page import LivePage, LiveRun
 from coneskin.view.page_server import PageServer
 
 from .browser import resident

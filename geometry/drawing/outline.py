@@ -92,6 +92,14 @@ class PathSegment:
             yield PathSegment(start, end, bulge)
 
     @property
+    def controls(self) -> tuple[FlatPoint, FlatPoint]:
+        """Inner control points of a cubic over an arc of at most a quarter turn [m], from its chord."""
+        half = 0.5 * abs(self.sweep)  # pull = 4/3 tan(sweep/4) radius, regular for a flat arc
+        pull = 2.0 / 3.0 * self.chord * math.tan(0.5 * half) / math.sin(half) if half else self.chord / 3.0
+        (x0, y0), (x1, y1), a, b = self.start, self.end, self.heading(0.0), self.heading(1.0)
+        return (x0 + pull * math.cos(a), y0 + pull * math.sin(a)), (x1 - pull * math.cos(b), y1 - pull * math.sin(b))
+
+    @property
     def area(self) -> float:
         """Area between the arc and its chord [m2], positive where the arc bulges to the right of the chord."""
         sweep = self.sweep

@@ -18,7 +18,7 @@ from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError
 
 from .cut_sheet import LINE_COLOURS, CutSheet
-from .outline import Outline, joint_bounds
+from .outline import Outline, circle_outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
 
@@ -206,12 +206,8 @@ def _path(outline: Outline) -> Iterator[str]:
             yield f"{at(*segment.end)} l"
             continue
         for piece in segment.split(max(1, math.ceil(abs(segment.sweep) / _MAX_CUBIC_SWEEP - 1e-9))):
-            half = 0.5 * abs(piece.sweep)  # pull = 4/3 tan(sweep/4) radius, from the chord: regular for a flat arc
-            pull = 2.0 / 3.0 * piece.chord * math.tan(0.5 * half) / math.sin(half) if half else piece.chord / 3.0
-            a, b = piece.heading(0.0), piece.heading(1.0)
-            first = at(piece.start[0] + pull * math.cos(a), piece.start[1] + pull * math.sin(a))
-            second = at(piece.end[0] - pull * math.cos(b), piece.end[1] - pull * math.sin(b))
-            yield f"{first} {second} {at(*piece.end)} c"
+            first, second = piece.controls
+            yield f"{at(*first)} {at(*second)} {at(*piece.end)} c"
     yield "s" if outline.closed else "S"
 
 
@@ -285,15 +281,9 @@ def _crop_marks(left: float, bottom: float, width: float, height: float) -> Iter
 
 def _registration(x: float, y: float) -> Iterator[str]:
     """Yield a cross in a ring on the border of two windows; half of it is on each page."""
-    k = 2.0 * 4.0 / 3.0 * math.tan(math.pi / 8.0)
     yield _line(x - 3.0, y, x + 3.0, y)
     yield _line(x, y - 3.0, x, y + 3.0)
-    a, b = [(2.0, 0.0), (0.0, 2.0), (-2.0, 0.0), (0.0, -2.0)], [(0.0, k), (-k, 0.0), (0.0, -k), (k, 0.0)]
-    words = [f"{_pdf_number(x + 2.0)} {_pdf_number(y)} m"]
-    for (px, py), (tx, ty), (qx, qy), (sx, sy) in zip(a, b, a[1:] + a[:1], b[1:] + b[:1], strict=True):
-        points = (x + px + tx, y + py + ty, x + qx - sx, y + qy - sy, x + qx, y + qy)
-        words.append(" ".join(_pdf_number(value) for value in points) + " c")
-    yield " ".join(words) + " s"
+    yield from _path(circle_outline(1e-3 * x, 1e-3 * y, 2e-3))
 
 
 def _map_page(tiling: _PageTiling, sheets: Sequence[CutSheet], title: str) -> list[str]:

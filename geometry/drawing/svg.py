@@ -71,11 +71,8 @@ def _path(outline: Outline, left: float, top: float) -> str:
         if segment.bulge == 0.0:
             words.append(f"L {end}")
         elif segment.radius > _MAX_ARC_RADIUS:  # on so flat an arc one cubic is exact to 1e-9 mm
-            pull = 4.0 / 3.0 * math.tan(0.25 * abs(segment.sweep)) * segment.radius
-            a, b = segment.heading(0.0), segment.heading(1.0)
-            first = at(segment.start[0] + pull * math.cos(a), segment.start[1] + pull * math.sin(a))
-            second = at(segment.end[0] - pull * math.cos(b), segment.end[1] - pull * math.sin(b))
-            words.append(f"C {first} {second} {end}")
+            first, second = segment.controls
+            words.append(f"C {at(*first)} {at(*second)} {end}")
         else:
             radius, large = _number(segment.radius * 1e3), int(abs(segment.sweep) > math.pi)
             words.append(f"A {radius} {radius} 0 {large} {int(segment.bulge < 0.0)} {end}")

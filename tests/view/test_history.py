@@ -12,9 +12,8 @@ from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
 from coneskin.view.history import FADING, UNKNOWN, History, PhaseWords, _ContactLog, _phase_after
-from coneskin.view.panel import event_list, state_of, status, timeline
+from coneskin.view.panel import _envelope, _plots, event_list, state_of, status, timeline
 from coneskin.view.run_course import RunCourse, read_courses
-from coneskin.view.traces import _envelope, _plots
 from tests.support.paths import COLLISION
 
 RUN = COLLISION

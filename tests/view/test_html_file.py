@@ -8,9 +8,9 @@ import pytest
 from coneskin.core.errors import RecordingError
 from coneskin.view.html_file import _bar_changes, write_html
 from coneskin.view.page_server import page_client
+from coneskin.view.panel import trace_drawings
 from coneskin.view.run_course import read_courses
 from coneskin.view.stage.level_scale import level_words
-from coneskin.view.traces import trace_drawings
 from tests.support.paths import COLLISION
 
 

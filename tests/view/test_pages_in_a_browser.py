@@ -14,8 +14,7 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind, EventName
 from coneskin.runs.replay.run import read_run
 from coneskin.view.html_file import write_html
-from coneskin.view.live_page import LivePage
-from coneskin.view.live_run import LiveRun
+from coneskin.view.live_page import LivePage, LiveRun
 from coneskin.view.page_server import PageServer
 from coneskin.view.run_course import RunCourse, read_courses
 from coneskin.view.run_page import show_runs

@@ -20,8 +20,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, force_block
 from coneskin.runs.replay.run import Run
 from coneskin.testing.scenes import forearm_scene
 from coneskin.view.history import History
-from coneskin.view.live_page import LivePage
-from coneskin.view.live_run import LiveRun
+from coneskin.view.live_page import LivePage, LiveRun
 from coneskin.view.run_course import read_courses
 from coneskin.view.stage_nodes import StageNodes
 

@@ -2,8 +2,8 @@
 
 import pytest
 
+from coneskin.view.panel import trace_drawings
 from coneskin.view.run_course import RunCourse, read_courses
-from coneskin.view.traces import trace_drawings
 from tests.support.paths import COLLISION
 
 RUN = COLLISION

@@ -44,7 +44,7 @@ class BlockKind(IntEnum):
     COMMAND = 11  #: a command as it was sent: to whom, a line feed, its bytes
     HEADER = 20  #: JSON: the scene and the versions
     OVERRUN = 21  #: JSON: how late the loop was
-    SURFACE = 22  #: heights of a mesh below a sensor, see ``coneskin.scene.surface_record``
+    SURFACE = 22  #: heights of a mesh below a sensor, see ``coneskin.scene.build``
     TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not; the force of a contact
     ECHO = 30  #: payload of the heartbeat's connection, for the driver's ``decode_heartbeat``
     SUSPENDED = 31  #: for how long the loop did nothing [s], by a clock that goes on while the computer sleeps

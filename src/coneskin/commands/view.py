@@ -28,7 +28,7 @@ from coneskin.core.errors import SceneError
 from .terminal import add_page_options, show_page
 
 if TYPE_CHECKING:
-    from coneskin.view.live_run import LiveRun
+    from coneskin.view.live_page import LiveRun
     from coneskin.view.page_server import PageServer
     from coneskin.view.stage.stage import Stage
 
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
         if scenes:
             raise SceneError(["--html writes recordings: name runs, such as runs/*"], str(scenes[0]))
         return _write(args)
-    from coneskin.view.live_run import LiveRun, is_live
+    from coneskin.view.live_page import LiveRun, is_live
 
     if scenes:
         return _follow_scene(args, scenes[0])
@@ -95,7 +95,7 @@ def _show(args: argparse.Namespace) -> int:
 def _follow_scene(args: argparse.Namespace, path: Path) -> int:
     from coneskin.scene.build import place_on_arm
     from coneskin.scene.reader import load_scene
-    from coneskin.view.live_run import LiveRun, find_live_run
+    from coneskin.view.live_page import LiveRun, find_live_run
     from coneskin.view.stage.stage import set_stage
 
     scene = load_scene(path)

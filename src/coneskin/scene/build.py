@@ -1,19 +1,25 @@
-"""Builder of a guard's parts from a scene. Only what the scene names is imported and built."""
+"""Builder of a guard's parts from a scene. Only what the scene names is imported and built.
+
+The surfaces below sensors on meshes are recorded, as names and grids of heights, so that a replay needs no mesh file.
+"""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import KinematicsError, SceneError
+from coneskin.core.errors import KinematicsError, RecordingError, SceneError
+from coneskin.core.text import read_json
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from coneskin.core.arrays import Floats
+    from coneskin.core.recording.block import Block
     from coneskin.geometry.displacement_map import DisplacementMap
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose, Vector
@@ -252,3 +258,49 @@ def _measured(path: Path, dh_mesh_frame: Pose, frusta: list[PlacedFrustum]) -> l
     mesh = load_mesh(path).moved(dh_mesh_frame)
     rays = RayCaster(mesh)
     return [measure_displacement(mesh, frustum, 64, 128, limit=_MAX_DEPTH, rays=rays) for frustum in frusta]
+
+
+_MAX_NODES = 2048  # of a grid, along and around; ``_measured`` makes 65 x 129
+
+
+def encode_surfaces(placed: Iterable[SensorOnArm], time: float) -> list[Block]:
+    """Return a block, with a host time [s], for each sensor that lies on a mesh."""
+    from coneskin.core.recording.block import Block
+    from coneskin.robot.guard.signals.journal import BlockKind
+
+    blocks = []
+    for item in placed:
+        if item.surface is not None:
+            rows, columns = item.surface.heights.shape
+            head = json.dumps({"sensor": item.name, "rows": rows, "columns": columns}).encode()
+            payload = head + b"\n" + item.surface.heights.astype("<f8").tobytes()
+            blocks.append(Block(BlockKind.SURFACE, time, payload))
+    return blocks
+
+
+def decode_surfaces(blocks: Iterable[Block]) -> dict[str, Floats]:
+    """Return the heights of the meshes [m] by the names of the sensors, from a recording's blocks of any kind.
+
+    Raises:
+        RecordingError: a block of this kind holds no grid of finite heights.
+    """
+    from coneskin.robot.guard.signals.journal import BlockKind
+
+    return dict(_decode_surface(block) for block in blocks if block.kind == BlockKind.SURFACE)
+
+
+def _decode_surface(block: Block) -> tuple[str, Floats]:
+    import numpy as np
+
+    head, _, body = block.payload.partition(b"\n")
+    try:
+        facts: dict[str, Any] = read_json(head)
+        name, shape = facts["sensor"], (facts["rows"], facts["columns"])
+        if not all(type(count) is int and 2 <= count <= _MAX_NODES for count in shape):
+            raise ValueError(f"its grid has {shape[0]!r} x {shape[1]!r} nodes")
+        heights = np.frombuffer(body, "<f8").reshape(shape)
+        if not isinstance(name, str) or not np.isfinite(heights).all():
+            raise ValueError("its name is no text, or a height is not finite")
+    except (ValueError, TypeError, KeyError) as exc:
+        raise RecordingError(f"the block of {block.time:.6f} s holds no surface of a sensor: {exc}") from exc
+    return name, heights

@@ -19,8 +19,7 @@ from coneskin.core.errors import RobotRefused
 from coneskin.core.process_watch import ProcessWatch
 from coneskin.core.recording.block import encode_block
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts
-from coneskin.scene.build import build_core, place_on_arm
-from coneskin.scene.surface_record import encode_surfaces
+from coneskin.scene.build import build_core, encode_surfaces, place_on_arm
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.sources.kinds import is_simulated, open_source
 from coneskin.skin.sources.source import SourceReopening

@@ -20,8 +20,7 @@ from .stage.sheet_field import (
 
 if TYPE_CHECKING:
     from .run_course import Moment
-    from .stage.sheet_surface import SheetSurface
-    from .stage.stage import Stage
+    from .stage.stage import SheetSurface, Stage
 
 _FIELD_OFF = "off"
 _FLAT_SPAN = 1e-3  # of the supply: what differs by less than this is drawn in one colour

@@ -17,12 +17,11 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import explain_os_error, write_whole
 
 from .page_server import PageServer, page_client
-from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline
+from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline, trace_drawings
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars, level_words
-from .stage.sheet_surface import SheetSurface
+from .stage.stage import SheetSurface
 from .stage_nodes import StageNodes, look_at_stages
-from .traces import trace_drawings
 
 _LEVEL_STEPS = 100  # of a level, which a bar can show
 

@@ -14,11 +14,10 @@ from coneskin.robot.guard.signals.journal import EventName
 
 from .field_choice import FieldChoice
 from .page_server import PageServer
-from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, timeline
+from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, timeline, trace_drawings
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars
 from .stage_nodes import StageNodes, look_at_stages
-from .traces import trace_drawings
 
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text

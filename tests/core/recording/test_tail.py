@@ -7,8 +7,8 @@ import pytest
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.recording.block import Block
+from coneskin.core.recording.reader import RecordingTail
 from coneskin.core.recording.recorder import Recorder
-from coneskin.core.recording.tail import RecordingTail
 
 HEADER, SKIN, EVENT = 20, 1, 10
 ALWAYS = frozenset({HEADER, EVENT})

@@ -20,9 +20,8 @@ from coneskin.core.recording.reader import read_recording
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
-from coneskin.scene.build import place_on_arm
+from coneskin.scene.build import decode_surfaces, encode_surfaces, place_on_arm
 from coneskin.scene.reader import parse_scene
-from coneskin.scene.surface_record import decode_surfaces, encode_surfaces
 from tests.geometry.synthetic import frustum
 from tests.scene.scenes import FULL, SKIN_ONLY, record
 from tests.support.paths import COLLISION

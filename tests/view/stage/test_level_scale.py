@@ -7,8 +7,7 @@ import pytest
 from coneskin.runs.replay.run import read_run
 from coneskin.skin.calibration import ForceTable
 from coneskin.view.stage.level_scale import level_bars, level_colour, level_words
-from coneskin.view.stage.sheet_surface import SheetSurface
-from coneskin.view.stage.stage import set_stage
+from coneskin.view.stage.stage import SheetSurface, set_stage
 from tests.support.paths import COLLISION
 
 RUN = COLLISION

@@ -18,7 +18,7 @@ from coneskin.view.stage.sheet_field import (
     linear,
     potential_colours,
 )
-from coneskin.view.stage.sheet_surface import SheetSurface
+from coneskin.view.stage.stage import SheetSurface
 from tests.scene.scenes import DOUBLE_CONE
 from tests.support.paths import COLLISION
 from tests.view.browser import rotation

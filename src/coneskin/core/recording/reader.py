@@ -1,11 +1,15 @@
-"""Reader of a recording: its intact blocks as a stream, in the order in which they were written, and its defects."""
+"""Reader of a recording: its intact blocks as a stream, in the order in which they were written, and its defects.
+
+A recording that grows is read chunk by chunk, without a lock, by another process.
+"""
 
 from __future__ import annotations
 
 import math
 import os
+from collections import deque
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
@@ -15,7 +19,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import explain_os_error, open_file
 from coneskin.core.progress import Progress, silent
 
-from .block import ALL_KINDS, COPY, DROPPED, FILE_KINDS, Block, decode_copy
+from .block import ALL_KINDS, COPY, DROPPED, END, FILE_KINDS, Block, decode_copy
 from .chunk import FILE_HEAD_SIZE, LAST_BIT, MAGIC, bits, decode_file_head
 from .defects import Defect, find_defects
 from .scan import Chunk, Damage, Extent, holds_chunk, walk
@@ -107,8 +111,13 @@ class Recording:
                             yield chunk
 
 
+def part_path(path: Path, number: int) -> Path:
+    """Return the path of a file of a recording: ``run.rec``, ``run.0001.rec``, ``run.0002.rec`` ..."""
+    return path if number == 0 else path.with_name(f"{path.stem}.{number:04d}{path.suffix}")
+
+
 def parts_of(path: Path) -> list[Path]:
-    """Return the files of a recording in their order: ``run.rec``, ``run.0001.rec``, ``run.0002.rec`` ..."""
+    """Return the files of a recording that are there, in their order."""
     further = sorted(path.parent.glob(f"{escape(path.stem)}.[0-9][0-9][0-9][0-9]*{escape(path.suffix)}"))
     numbered = [part for part in further if part.name[len(path.stem) + 1 : -len(path.suffix) or None].isdecimal()]
     return [path, *sorted(numbered, key=lambda part: (len(part.name), part.name))]
@@ -175,3 +184,79 @@ def _refuse(path: Path, head: bytes) -> None:
     if not head.startswith(MAGIC):
         raise RecordingError(f"{path} is no recording of coneskin: it does not begin with {MAGIC.decode()}")
     raise RecordingError(f"{path} has no header: not one chunk of it is intact")
+
+
+class RecordingTail:
+    """Reader of a recording that grows.
+
+    Args:
+        path: its first file.
+        keep: of what is there already, the chunks older than this before the newest are left out [s] ...
+        always: ... but for those with blocks of these kinds.
+
+    Attributes:
+        ended: the recording was closed: nothing more will come.
+        damaged: bytes that were passed over, because they are no intact chunk.
+
+    Raises:
+        RecordingError: there is no such file, or it is no recording.
+    """
+
+    def __init__(self, path: Path, keep: float, always: frozenset[int]) -> None:
+        self.path = path
+        self.ended = False
+        self.damaged = 0
+        self._keep, self._always = keep, bits(always)
+        self._part, self._offset = 0, FILE_HEAD_SIZE
+        file = self._open(0)
+        if file is None:
+            raise RecordingError(f"cannot read the recording {path}: it is not there, or is no ordinary file")
+        self._file = file
+        if decode_file_head(file.read(FILE_HEAD_SIZE)) is None:
+            file.close()
+            raise RecordingError(f"{path} is no recording that can be followed; look at it with: coneskin runs info")
+
+    def read(self) -> list[Block]:
+        """Return the blocks that have come since the last call; it does not wait for any.
+
+        Raises:
+            RecordingError: an intact chunk holds what cannot be.
+        """
+        recent, always = deque[Chunk](), list[Chunk]()
+        newest = 0.0
+        for chunk in self._chunks():
+            newest = max(newest, chunk.head.until)
+            (always if chunk.head.kinds & self._always else recent).append(chunk)
+            while recent and recent[0].head.until < newest - self._keep:
+                recent.popleft()
+        kept = sorted([*always, *recent], key=lambda chunk: chunk.head.sequence)
+        found = [block for chunk in kept for block in chunk.blocks()]
+        self.ended = self.ended or any(block.kind == END for block in found)
+        return found
+
+    def close(self) -> None:
+        """Close the file; may be called again."""
+        self._file.close()
+
+    def _chunks(self) -> Iterator[Chunk]:
+        """Yield each chunk that is whole."""
+        while True:
+            following = self._open(self._part + 1)  # before the size is asked for: then the one before is finished
+            size = self._file.seek(0, 2)
+            for piece in walk(self._file, self._offset, size):
+                if isinstance(piece, Chunk):
+                    self._offset = piece.end
+                    yield piece
+                elif piece.end < size or following is not None:
+                    self._offset = piece.end
+                    self.damaged += piece.end - piece.offset
+                # else it may be a chunk that is not whole yet
+            if following is None:
+                return
+            self._file.close()
+            self._file, self._part, self._offset = following, self._part + 1, FILE_HEAD_SIZE
+
+    def _open(self, part: int) -> BinaryIO | None:
+        with suppress(OSError):
+            return open_file(part_path(self.path, part), MAX_SIZE)
+        return None

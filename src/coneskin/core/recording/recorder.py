@@ -19,7 +19,7 @@ from coneskin.core.files import explain_os_error
 
 from .block import END, Block, encode_copy
 from .chunk import encode_chunk, encode_file_head
-from .reader import open_recording
+from .reader import open_recording, part_path
 
 if sys.platform != "win32":
     import fcntl
@@ -178,11 +178,6 @@ class Recorder:
         with explain_os_error(RecordingError, f"cannot write to the recording {self.path}"):
             while view:
                 view = view[self._file.write(view) or 0 :]
-
-
-def part_path(path: Path, number: int) -> Path:
-    """Return the path of a file of a recording: ``run.rec``, ``run.0001.rec``, ``run.0002.rec`` ..."""
-    return path if number == 0 else path.with_name(f"{path.stem}.{number:04d}{path.suffix}")
 
 
 def open_for_owner(name: str, flags: int) -> int:

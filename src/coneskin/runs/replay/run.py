@@ -302,8 +302,7 @@ class Run:
             SceneError: this version of coneskin cannot read the scene, or a sensor lies on a mesh that is not carried.
             RecordingError: a surface is damaged.
         """
-        from coneskin.scene.build import place_on_arm
-        from coneskin.scene.surface_record import decode_surfaces
+        from coneskin.scene.build import decode_surfaces, place_on_arm
 
         surfaces = frozenset({BlockKind.SURFACE})
         carried = [*self.copies, *self.select(kinds=surfaces)]

@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .sheet_surface import SheetSurface
+    from .stage import SheetSurface
 
 _COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
 #: quiet, touched and firm: from dark to bright, each with a contrast of 3 and more to the one before, to any eye

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from coneskin.skin.field.fourport import DrivePhase
     from coneskin.skin.sensor import Sensor
 
-    from .sheet_surface import SheetSurface
+    from .stage import SheetSurface
 
 #: what can be drawn -> the phase, and whether it is the upper sheet
 PHASES = {
