@@ -11,7 +11,7 @@ import json
 import queue
 import socket
 import threading
-from typing import Any
+from collections.abc import Callable
 from urllib.parse import urlsplit
 
 from coneskin.core.errors import MissingExtra, SceneError
@@ -30,115 +30,86 @@ def _event_message(event: GuardEvent, began: float, arm: str = "") -> bytes:
     return data if len(data) <= _MAX_DATAGRAM else json.dumps({**message, "cut": len(data)}).encode()
 
 
-class _UdpChannel:
-    def __init__(self, family: int, address: tuple[Any, ...], beyond: bool) -> None:
-        self._address = address
-        self._socket = socket.socket(family, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        if beyond and family == socket.AF_INET:  # the address may be that of a whole network
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-
-    def send(self, _: str, data: bytes) -> None:
-        self._socket.sendto(data, self._address)
-
-    def close(self) -> None:
-        self._socket.close()
-
-
+_Channel = tuple[Callable[[str, bytes], object], Callable[[], object]]  # what sends, or raises OSError; what closes
 _ZMQ_CLOSE_TIMEOUT = 200  # ms for the last events to leave
 
 
-class _ZmqChannel:
-    """A bound PUB socket; a message has two parts, the event's name, by which subscribers choose, and the JSON.
+def _open_zmq(host: str, port: int) -> _Channel:
+    """Bind a PUB socket, which drops a message for which a subscriber is too slow.
+
+    A message has two parts, the event's name, by which subscribers choose, and the JSON.
 
     Raises:
         SceneError: the address is taken, or not one of this computer.
         MissingExtra: pyzmq is not installed.
     """
+    try:
+        import zmq
+    except ModuleNotFoundError as exc:
+        raise MissingExtra("pyzmq", "publishing by ZeroMQ", "zmq") from exc
+    context = zmq.Context()
+    sock = context.socket(zmq.PUB)
+    sock.setsockopt(zmq.IPV6, ":" in host)
+    address = f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
+    try:
+        sock.bind(address)
+    except zmq.ZMQError as exc:
+        context.destroy(linger=0)
+        raise SceneError([f"cannot publish at {address}: {exc.strerror}; name another port"], "--publish") from exc
 
-    def __init__(self, host: str, port: int) -> None:
-        try:
-            import zmq
-        except ModuleNotFoundError as exc:
-            raise MissingExtra("pyzmq", "publishing by ZeroMQ", "zmq") from exc
-        self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.PUB)
-        self._no_wait = zmq.NOBLOCK
-        self._socket.setsockopt(zmq.IPV6, ":" in host)
-        address = f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
-        try:
-            self._socket.bind(address)
-        except zmq.ZMQError as exc:
-            self._context.destroy(linger=0)
-            raise SceneError([f"cannot publish at {address}: {exc.strerror}; name another port"], "--publish") from exc
-
-    def send(self, name: str, data: bytes) -> None:
-        """Hand a message to the socket, which drops it where a subscriber is too slow.
-
-        Raises:
-            OSError: it is closed.
-        """
-        if self._socket.closed:
+    def send(name: str, data: bytes) -> None:
+        if sock.closed:
             raise OSError("closed")
-        self._socket.send_multipart([name.encode(), data], self._no_wait)
+        sock.send_multipart([name.encode(), data], zmq.NOBLOCK)
 
-    def close(self) -> None:
-        """Close the socket; may be called again."""
-        self._context.destroy(linger=_ZMQ_CLOSE_TIMEOUT)
+    return send, lambda: context.destroy(linger=_ZMQ_CLOSE_TIMEOUT)
 
 
 _ANSWER_TIMEOUT = 5.0  # s for the broker to answer
 _MQTT_CLOSE_TIMEOUT = 0.5  # s for the last events to leave
 
 
-class _MqttChannel:
-    """A connection to a broker, made again where it is lost. An event's topic is ``topic`` and its name.
+def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str | None) -> _Channel:
+    """Connect to a broker, and again where the connection is lost. An event's topic is ``topic`` and its name.
 
     Raises:
         SceneError: no broker answers, or it refuses.
         MissingExtra: paho-mqtt is not installed.
     """
+    try:
+        from paho.mqtt.client import Client
+        from paho.mqtt.enums import CallbackAPIVersion
+    except ModuleNotFoundError as exc:
+        raise MissingExtra("paho-mqtt", "publishing by MQTT", "mqtt") from exc
+    answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+    ended = threading.Event()
+    client = Client(CallbackAPIVersion.VERSION2)  # no callback holds it: no circle of references
+    client.on_connect = lambda *said: answers.put(str(said[3]) if said[3].is_failure else "")
+    client.on_disconnect = lambda *_: ended.set()
+    client.reconnect_delay_set(1, 10)
+    client.username_pw_set(user, password)
+    client.connect_timeout = _ANSWER_TIMEOUT
 
-    def __init__(self, host: str, port: int, topic: str, user: str | None = None, password: str | None = None) -> None:
-        try:
-            from paho.mqtt.client import Client
-            from paho.mqtt.enums import CallbackAPIVersion
-        except ModuleNotFoundError as exc:
-            raise MissingExtra("paho-mqtt", "publishing by MQTT", "mqtt") from exc
-        answers: queue.SimpleQueue[str] = queue.SimpleQueue()  # no callback holds this channel: no circle of references
-        ended = self._ended = threading.Event()
-        client = self._client = Client(CallbackAPIVersion.VERSION2)
-        client.on_connect = lambda *said: answers.put(str(said[3]) if said[3].is_failure else "")
-        client.on_disconnect = lambda *_: ended.set()
-        client.reconnect_delay_set(1, 10)
-        client.username_pw_set(user, password)
-        client.connect_timeout = _ANSWER_TIMEOUT
-        self._topic = topic
-        try:
-            client.connect(host, port)
-            client.loop_start()
-            refusal = answers.get(timeout=_ANSWER_TIMEOUT)
-        except (OSError, queue.Empty) as exc:
-            refusal = getattr(exc, "strerror", "") or str(exc) or "it does not answer"
-        if refusal:
-            self.close()
-            why = f"no MQTT broker takes events at {host}:{port}: {refusal}; start one there, such as mosquitto"
-            raise SceneError([why], "--publish")
-
-    def send(self, name: str, data: bytes) -> None:
-        """Hand a message to the thread of the connection.
-
-        Raises:
-            OSError: there is no connection.
-        """
-        if self._client.publish(f"{self._topic}/{name}", data).rc:
+    def send(name: str, data: bytes) -> None:
+        if client.publish(f"{topic}/{name}", data).rc:
             raise OSError("not connected")
 
-    def close(self) -> None:
-        """Close the connection; may be called again."""
-        self._ended.clear()
-        if self._client.disconnect() or self._ended.wait(_MQTT_CLOSE_TIMEOUT):
-            self._client.loop_stop()
+    def close() -> None:
+        ended.clear()
+        if client.disconnect() or ended.wait(_MQTT_CLOSE_TIMEOUT):
+            client.loop_stop()
+
+    try:
+        client.connect(host, port)
+        client.loop_start()
+        refusal = answers.get(timeout=_ANSWER_TIMEOUT)
+    except (OSError, queue.Empty) as exc:
+        refusal = getattr(exc, "strerror", "") or str(exc) or "it does not answer"
+    if refusal:
+        close()
+        why = f"no MQTT broker takes events at {host}:{port}: {refusal}; start one there, such as mosquitto"
+        raise SceneError([why], "--publish")
+    return send, close
 
 
 class EventPublisher:
@@ -176,18 +147,21 @@ class EventPublisher:
         if not beyond and not ipaddress.ip_address(address[0]).is_loopback:
             why = f"{host} is not this computer, and whoever is on its network could read the events; {_URL_EXAMPLE}"
             raise SceneError([f"{why}, or allow it with --publish-beyond"], "--publish")
-        self._channel: _UdpChannel | _ZmqChannel | _MqttChannel
-        if parts.scheme == "udp":
-            self._channel = _UdpChannel(family, address, beyond)
-        elif parts.scheme == "zmq":
-            self._channel = _ZmqChannel(str(address[0]), port)
+        if parts.scheme == "zmq":
+            self._send, self._close = _open_zmq(str(address[0]), port)
+        elif parts.scheme == "mqtt":
+            self._send, self._close = _open_mqtt(host, port, topic or "coneskin", parts.username, parts.password)
         else:
-            self._channel = _MqttChannel(host, port, topic or "coneskin", parts.username, parts.password)
+            sock = socket.socket(family, socket.SOCK_DGRAM)
+            sock.setblocking(False)
+            if beyond and family == socket.AF_INET:  # the address may be that of a whole network
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            self._send, self._close = lambda _, data: sock.sendto(data, address), sock.close
 
     def publish(self, event: GuardEvent, began: float) -> None:
         """Send an event, or drop it; times count from when the run began [s]. It never waits and never raises."""
         try:
-            self._channel.send(event.name, _event_message(event, began, self._arm))
+            self._send(event.name, _event_message(event, began, self._arm))
         except (OSError, ValueError, TypeError):
             self.dropped += 1
         else:
@@ -195,4 +169,4 @@ class EventPublisher:
 
     def close(self) -> None:
         """Close the connection, once what was sent has left, for which it waits a moment; may be called again."""
-        self._channel.close()
+        self._close()
