@@ -23,7 +23,7 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader
 from coneskin.robot.driver.values import ControllerState, StopPath
 
-_TIMEOUT = 20.0  # s; far beyond what a controller needs, so reached only where the contract is broken
+_CHECK_TIMEOUT = 20.0  # s; far beyond what a controller needs, so reached only where the contract is broken
 _MOTION_SPEED = 0.1  # rad/s of the leading joint, from which on the arm moves
 _STANDSTILL_SPEED = 0.02  # rad/s
 _STANDING_STATES = 25  # in a row
@@ -51,17 +51,17 @@ class ArmOnTest:
 
     def states(self, reader: PayloadReader) -> list[ControllerState]:
         """Return the next states, at least one."""
-        end = time.monotonic() + _TIMEOUT
+        end = time.monotonic() + _CHECK_TIMEOUT
         while time.monotonic() < end:
             wait_readable([reader], 0.1)
             if payloads := reader.read():
                 return [self.driver.decode_state(time.monotonic(), payload) for payload in payloads]
-        raise AssertionError(f"the reader brings no state within {_TIMEOUT:g} s")
+        raise AssertionError(f"the reader brings no state within {_CHECK_TIMEOUT:g} s")
 
     def wait(self, reader: PayloadReader, standing: bool) -> list[ControllerState]:
         """Return the states until the arm moves, or until it stands."""
         seen: list[ControllerState] = []
-        in_row, end = 0, time.monotonic() + _TIMEOUT
+        in_row, end = 0, time.monotonic() + _CHECK_TIMEOUT
         while time.monotonic() < end:
             for state in self.states(reader):
                 seen.append(state)
@@ -69,7 +69,7 @@ class ArmOnTest:
                 in_row = in_row + 1 if met else 0
                 if in_row >= _STANDING_STATES:
                     return seen
-        raise AssertionError(f"the arm {'still moves' if standing else 'does not move'} after {_TIMEOUT:g} s")
+        raise AssertionError(f"the arm {'still moves' if standing else 'does not move'} after {_CHECK_TIMEOUT:g} s")
 
 
 OpenArm = Callable[[], AbstractContextManager[ArmOnTest]]
@@ -81,7 +81,7 @@ def _paths(driver: ArmDriver) -> frozenset[StopPath]:
 
 def _check_states_carry_time_and_joint_speeds(open_arm: OpenArm) -> None:
     """Check that the controller's clock goes on, and that the speeds are those at which the positions change."""
-    with open_arm() as arm, arm.driver.state_reader(arm.host, _TIMEOUT) as reader:
+    with open_arm() as arm, arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader:
         arm.move()
         states = arm.wait(reader, standing=False)[-_STANDING_STATES:]
     times = [state.controller_time for state in states]
@@ -110,8 +110,8 @@ def _check_each_stop_path_stops_the_arm(open_arm: OpenArm) -> None:
     for path in sorted(paths, key=lambda path: path.value):
         with (
             open_arm() as arm,
-            arm.driver.state_reader(arm.host, _TIMEOUT) as reader,
-            arm.driver.stop_connections(arm.host, _TIMEOUT) as stops,
+            arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader,
+            arm.driver.stop_connections(arm.host, _CHECK_TIMEOUT) as stops,
         ):
             assert set(stops.sockets()) <= set(arm.driver.lost_with), "each socket needs a row in lost_with"
             arm.move()
@@ -122,17 +122,17 @@ def _check_each_stop_path_stops_the_arm(open_arm: OpenArm) -> None:
 
 def _check_a_path_that_there_is_not_is_refused(open_arm: OpenArm) -> None:
     """Check that ``use`` tells of a path that the driver does not have."""
-    with open_arm() as arm, arm.driver.stop_connections(arm.host, _TIMEOUT) as stops:
+    with open_arm() as arm, arm.driver.stop_connections(arm.host, _CHECK_TIMEOUT) as stops:
         for path in frozenset(StopPath) - _paths(arm.driver) - {StopPath.DRIVER, StopPath.WATCHDOG}:
             assert not stops.use(path, _DECELERATION), f"{path} is in no row of lost_with, and use took it"
 
 
 def _check_nonsense_is_an_error(open_arm: OpenArm) -> None:
     """Check that a payload that is none, or is cut, is never a state."""
-    with open_arm() as arm, arm.driver.state_reader(arm.host, _TIMEOUT) as reader:
+    with open_arm() as arm, arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader:
         payloads: list[bytes] = []
         while not payloads:
-            wait_readable([reader], _TIMEOUT)
+            wait_readable([reader], _CHECK_TIMEOUT)
             payloads = reader.read()
     for payload in (b"", payloads[0][:-1], payloads[0] + b"\0", b"\xff" * len(payloads[0])):
         try:
@@ -155,8 +155,8 @@ def _check_the_arm_of_another_table_is_refused(open_arm: OpenArm) -> None:
 
 def _check_a_lost_controller_is_an_error_and_stays_one(open_arm: OpenArm) -> None:
     """Check that a controller that is gone is told of by the reader and by the stops: it must not look like silence."""
-    with open_arm() as arm, arm.driver.state_reader(arm.host, _TIMEOUT) as reader:
-        with arm.driver.stop_connections(arm.host, _TIMEOUT) as stops:
+    with open_arm() as arm, arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader:
+        with arm.driver.stop_connections(arm.host, _CHECK_TIMEOUT) as stops:
             names = set(stops.sockets())
             arm.pull()
             with suppress(RobotConnectionError):
@@ -164,7 +164,7 @@ def _check_a_lost_controller_is_an_error_and_stays_one(open_arm: OpenArm) -> Non
                     arm.states(reader)
             _expect_connection_error("read", reader.read)
             lost: set[str] = set()
-            end = time.monotonic() + _TIMEOUT
+            end = time.monotonic() + _CHECK_TIMEOUT
             while lost != names and time.monotonic() < end:
                 wait_readable(list(stops.sockets().values()), 0.1)
                 for name, sock, why in stops.drain():
@@ -182,8 +182,8 @@ def _check_closing_twice_is_fine_and_reading_then_is_not(open_arm: OpenArm) -> N
     """Check that closed connections stay closed."""
     with (
         open_arm() as arm,
-        arm.driver.state_reader(arm.host, _TIMEOUT) as reader,
-        arm.driver.stop_connections(arm.host, _TIMEOUT) as stops,
+        arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader,
+        arm.driver.stop_connections(arm.host, _CHECK_TIMEOUT) as stops,
     ):
         for _ in range(2):
             reader.close()
