@@ -54,7 +54,7 @@ HOMES = {
     "xacrodoc": ("geometry/urdf.py",),
     "ezdxf": ("geometry/drawing/dxf.py",),
     "rpack": ("geometry/drawing/nesting.py",),
-    "pyarrow": ("src/coneskin/runs/export/parquet_file.py",),
+    "pyarrow": ("src/coneskin/runs/export/tables.py",),
     "distributed": ("src/coneskin/runs/what_if/what_if.py",),
     "argcomplete": ("src/coneskin/cli.py",),
     "mujoco": ("src/coneskin/impact/simulation/mujoco_*.py",),

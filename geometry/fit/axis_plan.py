@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from coneskin.core.arrays import Bools, Floats
 
-from .intervals import balance_borders, choose_intervals, longest_intervals
 from .profile import RadialProfile, Region
-from .side import StraightSide, fit_side
+from .side import StraightSide, balance_borders, choose_intervals, fit_side, longest_intervals
 from .touch_weights import TouchWeights
 
 

@@ -15,7 +15,6 @@ from .coarse_packing import AxisSurvey
 from .cone_fit import InfiniteCone
 from .plan import SheetPlan
 from .profile import RadialProfile
-from .side import covered_points
 from .surface_samples import SurfaceSamples
 
 _MAX_HULL_FACES = 5000  # faces; a convex mesh with more is a smooth body, not a collision hull
@@ -154,7 +153,7 @@ def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples,
     covered = np.zeros(len(hull), bool)
     for about in plans:
         for side in about.sides:
-            covered |= covered_points(about.profile, side, hull, tolerance)
+            covered |= side.covers(about.profile, hull, tolerance)
     return covered
 
 

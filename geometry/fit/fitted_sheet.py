@@ -14,7 +14,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 
 from .axis_plan import AxisPlan
-from .side import StraightSide, covered_points
+from .side import StraightSide
 from .surface_samples import SurfaceSamples
 
 
@@ -97,7 +97,7 @@ def fitted_sheet(
     hole = profile.bridged[side.first : side.end][:, cells] - radius > tolerance
     miss = (radius - line) * cosine
     seen = miss[~hole]
-    below = covered_points(profile, side, hull, tolerance)
+    below = side.covers(profile, hull, tolerance)
     return FittedSheet(
         placed=PlacedFrustum(Frustum(max(radii[0], 0.0), max(radii[1], 0.0), end - start, wrap), pose),
         max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,

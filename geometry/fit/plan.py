@@ -17,7 +17,7 @@ from .candidates import SampledLink
 from .coarse_packing import AxisSurvey, Choice, packings
 from .cone_fit import InfiniteCone, fit_cone
 from .profile import AxisFrame, RadialProfile
-from .side import StraightSide, covered_points, facet_offset
+from .side import StraightSide, facet_offset
 
 
 def refine_axis(profile: RadialProfile, sides: list[StraightSide], tolerance: float, seam: Floats) -> AxisFrame:
@@ -235,7 +235,7 @@ def _refined(
     else:
         side = max(plan.sides, key=lambda side: side.area(plan.profile))
         cone = InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
-        below = hull.subset(covered_points(plan.profile, side, hull, requirements.tolerance))
+        below = hull.subset(side.covers(plan.profile, hull, requirements.tolerance))
         fitted = fit_cone(below, cone, (requirements.tolerance,))
         if fitted is not None:
             frame = AxisFrame.along(fitted.origin, fitted.axis, requirements.seam_direction)
@@ -244,7 +244,7 @@ def _refined(
             lines = [(fitted.radius, slope), *((r + s * moved, s) for r, s in lines)]
     rises, areas = [], []
     for side in plan.sides:
-        below = hull.subset(covered_points(plan.profile, side, hull, requirements.tolerance))
+        below = hull.subset(side.covers(plan.profile, hull, requirements.tolerance))
         near = InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
         if not full:
             away = float((frame.origin - plan.profile.frame.origin) @ frame.axis)

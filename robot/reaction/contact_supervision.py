@@ -129,7 +129,7 @@ def clamped(contacts: Sequence[ContactOnLink]) -> bool:
     """Tell whether touches may hold the arm between them: on two links, or more than 60 deg apart on one."""
     first = contacts[0] if contacts else None
     return first is not None and any(
-        other.link != first.link or _cosine(first.normal, other.normal) < _SAME_SIDE for other in contacts[1:]
+        other.link != first.link or dot(first.normal, other.normal) < _SAME_SIDE for other in contacts[1:]
     )
 
 
@@ -144,11 +144,7 @@ def opposed(model: ArmModel, q: Joints, contacts: Sequence[ContactOnLink]) -> bo
     if len(contacts) < 2:
         return False
     normals = [place_point(model, q, c.link, c.point, c.normal).direction for c in contacts]
-    return any(_cosine(a, b) < 0.0 for i, a in enumerate(normals) for b in normals[:i])
-
-
-def _cosine(a: Sequence[float], b: Sequence[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return any(dot(a, b) < 0.0 for i, a in enumerate(normals) for b in normals[:i])
 
 
 _BLIND_RATIO = 4.0  # to ``press``: way of any point while a touch has no certain place, which takes 2 frames or more

@@ -296,7 +296,7 @@ def _export(args: argparse.Namespace) -> int:
 
 
 def _prune(args: argparse.Namespace) -> int:
-    from coneskin.session.retention import prune_run
+    from coneskin.session.event_log import prune_run
 
     if not 0.0 <= args.around < math.inf:
         raise RecordingError(f"--around must be 0 s or more, got {args.around:g}")

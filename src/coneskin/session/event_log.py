@@ -2,6 +2,8 @@
 
 A program's own function is called for each event from a thread in which it may take its time. What waits for it has a
 bound, so a function that blocks delays neither the recording nor the monitoring of the guard.
+
+Retention: the events of a run stay for ever, all that was recorded around them for a while, and the rest is dropped.
 """
 
 from __future__ import annotations
@@ -13,21 +15,22 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import ConeSkinError, RecordingError
 from coneskin.core.files import explain_os_error
+from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block, decode_blocks
-from coneskin.core.recording.reader import parts_of
-from coneskin.core.recording.recorder import Recorder
+from coneskin.core.recording.defects import DefectKind
+from coneskin.core.recording.reader import Recording, parts_of, read_recording
+from coneskin.core.recording.recorder import Recorder, hold_against_recorder
+from coneskin.core.recording.retention import prune_file
 from coneskin.core.version import code_versions
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
 from coneskin.scene.tables.source_tables import source_label
 from coneskin.scene.values.scene import RecordingScene
-
-from .retention import prune_part
 
 if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
@@ -74,7 +77,7 @@ class EventLog:
         self.physics: Callable[[], list[Block]] = list  # what it knows since it was last asked
         self._truths: deque[Block] = deque()  # that the thread which writes has not written yet
         size, keep = (limits.max_size, limits.keep) if limits else (None, None)
-        self._recorder = Recorder(recording, size, _COPIED_KINDS, keep, prune_part) if recording else None
+        self._recorder = Recorder(recording, size, _COPIED_KINDS, keep, _prune_part) if recording else None
         self._delivery = None if on_event is None else _EventDelivery(on_event)
         self._changed = threading.Condition()
 
@@ -320,3 +323,69 @@ class _HeardLine:
             return ""
         name = source_label(scene.source)
         return f"on {name}, {found.line}" if capture.pieces else f"no byte has come from {name}: {found.remedy}"
+
+
+AROUND = 5.0  #: s before and after an event in which all stays
+_KEPT_KINDS = frozenset({BlockKind.HEADER, BlockKind.SURFACE, BlockKind.TRUTH, BlockKind.EVENT, BlockKind.OVERRUN})
+_EVENT_KINDS = frozenset({BlockKind.EVENT})
+#: events that are no reason to keep what led to them
+_ORDINARY_EVENTS = frozenset(
+    {
+        EventName.WAITING,
+        EventName.ACTIVATED,
+        EventName.NOT_COMMISSIONED,
+        EventName.MESSAGE,
+        EventName.REFUSED,
+        EventName.RESET,
+        EventName.ENDING,
+        EventName.RECORDING_GAP,
+    }
+)
+
+
+def prune_run(path: Path, around: float = AROUND, progress: Progress = silent) -> tuple[int, int]:
+    """Drop what is far from any touch, stop or fault; a run that was pruned says so, and cannot be replayed as a whole.
+
+    Args:
+        path: a recording, or the folder of a run with one in it.
+        around: time before and after such an event in which all stays [s].
+
+    Returns:
+        bytes before and after.
+
+    Raises:
+        RecordingError: it cannot be read, or is being recorded now.
+    """
+    path = path / "run.rec" if path.is_dir() else path
+    recording = read_recording(path, progress)
+    parts = parts_of(path)
+    with hold_against_recorder(parts[-1]):
+        windows = _windows(recording, around)
+        # a touch may be in what is lost
+        lost = [defect for defect in recording.defects if defect.kind is not DefectKind.DROPPED]
+        windows += [(defect.since - around, defect.until + around) for defect in lost]
+        for part in parts:
+            for _ in prune_file(part, windows, _KEPT_KINDS):
+                pass
+    return recording.size, sum(part.stat().st_size for part in parts)
+
+
+def _prune_part(path: Path, around: float = AROUND) -> Iterator[None]:
+    """Drop the same from one file of a recording that goes on, step by step.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    yield from prune_file(path, _windows(read_recording(path), around), _KEPT_KINDS)
+
+
+def _windows(recording: Recording, around: float) -> list[tuple[float, float]]:
+    """Return the times around what is no ordinary event; those that overlap are one."""
+    windows: list[tuple[float, float]] = []
+    for block in recording.select(kinds=_EVENT_KINDS):
+        if decode_event(block).name not in _ORDINARY_EVENTS:
+            since = block.time - around
+            if windows and since <= windows[-1][1]:
+                since = windows.pop()[0]
+            windows.append((since, block.time + around))
+    return windows

@@ -14,8 +14,7 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.core.recording.retention import prune_file
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import read_run
-from coneskin.session.event_log import EventLog, discard_recording, new_recording
-from coneskin.session.retention import prune_run
+from coneskin.session.event_log import EventLog, discard_recording, new_recording, prune_run
 from tests.scene.scenes import record
 
 EVENT = 10

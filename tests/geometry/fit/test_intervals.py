@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from coneskin.geometry.fit.intervals import balance_borders, choose_intervals, least_deviation, longest_intervals
+from coneskin.geometry.fit.side import _least_deviation, balance_borders, choose_intervals, longest_intervals
 
 from ..synthetic import Floats
 
@@ -27,7 +27,7 @@ def bounds(cells: list[tuple[float, float]], step: float = 0.005) -> tuple[Float
 @given(RADII)
 def test_least_deviation_is_the_linear_programme(cells: list[tuple[float, float]]) -> None:
     z, high, low = bounds(cells)
-    deviation, start, slope = least_deviation(z, high, low)
+    deviation, start, slope = _least_deviation(z, high, low)
     one = np.ones_like(z)
     # least t with high - t <= a + b z <= low + t
     above = np.stack([-one, -z, -one], axis=1)
@@ -44,7 +44,7 @@ def test_least_deviation_is_the_linear_programme(cells: list[tuple[float, float]
 def test_least_deviation_of_a_straight_side_is_its_spread_across_it() -> None:
     z = np.linspace(-0.1, 0.2, 50)
     radius = 0.07 + np.tan(np.radians(60.0)) * z
-    deviation, start, slope = least_deviation(z, radius + 0.002, radius - 0.002)
+    deviation, start, slope = _least_deviation(z, radius + 0.002, radius - 0.002)
     assert deviation == pytest.approx(0.002 * np.cos(np.radians(60.0)), abs=1e-12)
     assert start == pytest.approx(0.07, abs=1e-12)
     assert slope == pytest.approx(np.tan(np.radians(60.0)), abs=1e-12)
@@ -53,7 +53,7 @@ def test_least_deviation_of_a_straight_side_is_its_spread_across_it() -> None:
 def test_least_deviation_of_an_arc_is_half_its_sagitta() -> None:
     z = np.linspace(0.0, 0.1, 101)
     arc = 0.003 * (1.0 - ((z - 0.05) / 0.05) ** 2)
-    deviation, _, slope = least_deviation(z, 0.05 + arc, 0.05 + arc)
+    deviation, _, slope = _least_deviation(z, 0.05 + arc, 0.05 + arc)
     assert deviation == pytest.approx(0.0015, abs=1e-12)
     assert slope == pytest.approx(0.0, abs=1e-12)
 
@@ -69,7 +69,7 @@ def brute_cover(z: Floats, high: Floats, low: Floats, tolerance: float, most: in
         (i, j)
         for i in range(count)
         for j in range(i + shortest, count + 1)
-        if low[i:j].min() > 0.0 and least_deviation(z[i:j], high[i:j], low[i:j])[0] <= tolerance
+        if low[i:j].min() > 0.0 and _least_deviation(z[i:j], high[i:j], low[i:j])[0] <= tolerance
     ]
     best = 0
     for n in range(1, most + 1):
@@ -98,7 +98,7 @@ def test_the_cover_is_the_best_there_is(cells: list[tuple[float, float]], most: 
     assert all(a[1] <= b[0] for a, b in itertools.pairwise(chosen))
     for i, j in chosen:
         assert j - i >= shortest
-        assert least_deviation(z[i:j], high[i:j], low[i:j])[0] <= 0.001
+        assert _least_deviation(z[i:j], high[i:j], low[i:j])[0] <= 0.001
     assert sum(j - i for i, j in chosen) == brute_cover(z, high, low, 0.001, most, shortest)
 
 
@@ -121,7 +121,7 @@ def test_no_interval_with_a_bend_is_a_slice_shorter_than_it_need_be() -> None:
         high, low = (radius + sign * np.abs(rng.normal(0.0, 0.0015, 24)) for sign in (1.0, -1.0))
         for first, end in enumerate(longest_intervals(z, high, low, 0.002, 3)):
             longer = slice(first, end + 1)
-            if first + 3 <= end < len(z) and least_deviation(z[longer], high[longer], low[longer])[0] <= 0.002:
+            if first + 3 <= end < len(z) and _least_deviation(z[longer], high[longer], low[longer])[0] <= 0.002:
                 shorter.append((seed, first, end))
     assert shorter == []
 
@@ -149,7 +149,7 @@ def test_borders_between_unlike_halves_balance() -> None:
 
     def worst(border: int) -> float:
         halves = ((0, border), (border, 200))
-        return max(least_deviation(z[i:j], radius[i:j], radius[i:j])[0] for i, j in halves)
+        return max(_least_deviation(z[i:j], radius[i:j], radius[i:j])[0] for i, j in halves)
 
     border = chosen[0][1]
     assert worst(border) <= min(worst(b) for b in range(10, 190)) * (1.0 + 1e-9)

@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.geometry.fit.cone_fit import InfiniteCone
 from coneskin.geometry.fit.profile import measure_profile
-from coneskin.geometry.fit.side import StraightSide, covered_points, facet_offset, fit_side
+from coneskin.geometry.fit.side import StraightSide, facet_offset, fit_side
 from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import make_mesh
 from coneskin.geometry.ray_casting import RayCaster
@@ -97,7 +97,7 @@ def test_what_lies_under_a_partial_sheet() -> None:
     samples = sample_surface(mesh, rays)
     profile = measure_profile(mesh, rays, FRAME, 0.002, 90)
     side = StraightSide(50, 100, 80, 30, 0.05, 0.0)  # 100..200 mm, 320 to 80 degrees, across the seam
-    chosen = samples.points[covered_points(profile, side, samples, 0.001)]
+    chosen = samples.points[side.covers(profile, samples, 0.001)]
     azimuth = np.degrees(np.arctan2(*(FRAME.local(chosen)[:, 1::-1].T)))
     assert chosen[:, 2].min() > 0.099
     assert chosen[:, 2].max() < 0.201

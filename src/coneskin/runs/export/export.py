@@ -18,7 +18,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of, explain_os_error
 from coneskin.core.progress import Progress, silent
 
-from .tables import Pieces, Table, table_pieces
+from .tables import Pieces, Table, table_pieces, write_parquet
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,8 +121,6 @@ def export_run(run: Run, target: Path, form: str | None = None, progress: Progre
         raise RecordingError(f"{target} is there already; nothing is overwritten: name another")
     with explain_os_error(RecordingError, f"cannot write {target}"):
         if form in ("csv", "parquet"):
-            from .parquet_file import write_parquet
-
             write = _write_csv if form == "csv" else write_parquet
             if not (written := _write_folder(target, table_pieces(run, progress), form, write)):
                 raise _nothing(run)

@@ -8,9 +8,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.core.errors import MissingExtra, RecordingError
+from coneskin.core.files import explain_os_error
 from coneskin.core.progress import Progress, silent
 from coneskin.robot.arm.models import JOINT_COUNT
 from coneskin.robot.guard.signals.journal import BlockKind
@@ -118,3 +122,32 @@ def _commands(run: Run, start: float) -> Iterator[Table]:
         (command.time - start, command.what, json.dumps(command.numbers)) for command in recorded_commands(run.blocks)
     )
     return _pieces(("time_s", "command", "numbers_json"), rows)
+
+
+def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
+    """Write a table, in pieces with the same columns, as a Parquet file, and return the number of its rows.
+
+    Raises:
+        MissingExtra: pyarrow is not installed.
+        RecordingError: the file cannot be written.
+    """
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as exc:
+        raise MissingExtra("pyarrow", "a Parquet file", "tables") from exc
+    rows = 0
+    with explain_os_error(RecordingError, f"cannot write {path}"), ExitStack() as stack:
+        writer = None
+        for piece in pieces:
+            part = pa.table(dict(piece), schema=None if writer is None else writer.schema)
+            if writer is None:
+                kinds = [
+                    (column.name, pa.int64() if pa.types.is_null(column.type) else column.type)
+                    for column in part.schema
+                ]
+                writer = stack.enter_context(pq.ParquetWriter(path, pa.schema(kinds), compression="zstd"))
+                part = part.cast(writer.schema)
+            writer.write_table(part)
+            rows += part.num_rows
+    return rows

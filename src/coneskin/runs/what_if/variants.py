@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
 from coneskin.core.text import finite
-from coneskin.runs.export.parquet_file import write_parquet
+from coneskin.runs.export.tables import write_parquet
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
