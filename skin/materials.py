@@ -3,10 +3,10 @@
 A long narrow sensor has a large resistance along and a small one around, a ring the other way round. One material for
 both layers then makes one drive current small beside the other; two materials bring them together again.
 
-The force of the padding is that of a spring, stiff from its thickness on, times a factor that grows with the speed of
-the indentation (Hunt and Crossley), so that it begins and ends at 0 and never pulls:
+The force of the padding is that of springs in straight pieces, stiff from its end on, times a factor that grows with
+the speed of the indentation (Hunt and Crossley), so that it begins and ends at 0 and never pulls:
 
-    f = e(s) (1 + loss ds/dt),  e(s) = stiffness s up to the thickness, and hard_stiffness more per meter beyond
+    f = e(s) (1 + loss ds/dt),  e(s) = as its table says, or stiffness s, and hard_stiffness more per meter beyond
 
 Source: Hunt and Crossley, "Coefficient of restitution interpreted as damping in vibroimpact", J. Appl. Mech. 42 (1975).
 """
@@ -14,7 +14,8 @@ Source: Hunt and Crossley, "Coefficient of restitution interpreted as damping in
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 from coneskin.core.errors import SensorError
@@ -76,6 +77,9 @@ def match_sheet_materials(
     return min(((one, two) for one in upper for two in lower), key=cost)
 
 
+_MAX_GROWTH = 2.0  # of the force between two depths: the straight line is then at most 6 % above a curve that stiffens
+
+
 @dataclass(frozen=True, slots=True)
 class Padding:
     """Padding of a skin as one thing that presses on it feels it. The defaults are assumed, not measured.
@@ -85,6 +89,9 @@ class Padding:
         stiffness: until there [N/m].
         hard_stiffness: beyond, of what is below [N/m].
         loss: damping [s/m]; the force of an indentation at 1 m/s is 1 + loss times that at rest.
+        table: indentations [m] and forces [N] as measured, in place of thickness and stiffness; it ends with the last.
+        spread: share by which the force of any indentation may be off, below 1.
+        pieces: indentation, force and slope [N/m] from where each straight piece begins; follows from the others.
 
     Raises:
         SensorError: a value is not finite, or out of its range.
@@ -94,6 +101,9 @@ class Padding:
     stiffness: float = 10e3
     hard_stiffness: float = 1e6
     loss: float = 0.3
+    table: tuple[tuple[float, float], ...] = ()
+    spread: float = 0.15
+    pieces: tuple[tuple[float, float, float], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, unit in (("thickness", "m"), ("stiffness", "N/m"), ("hard_stiffness", "N/m")):
@@ -102,13 +112,32 @@ class Padding:
                 raise SensorError(f"padding.{name} must be finite and above 0 {unit}, got {value!r} {unit}")
         if not (math.isfinite(self.loss) and self.loss >= 0.0):
             raise SensorError(f"padding.loss must be finite and not negative [s/m], got {self.loss!r}")
+        if not 0.0 <= self.spread < 1.0:
+            raise SensorError(f"padding.spread must be at least 0 and below 1, got {self.spread!r}")
+        knots = ((0.0, 0.0), *(self.table or ((self.thickness, self.stiffness * self.thickness),)))
+        for (s, f), (deeper, harder) in pairwise(knots):
+            if not (s < deeper < math.inf and f < harder < math.inf):
+                was = f"{harder:g} N at {1e3 * deeper:g} mm after {f:g} N at {1e3 * s:g} mm"
+                raise SensorError(f"the depths and the forces of a padding must rise, got {was}")
+            if f and harder > _MAX_GROWTH * f:
+                was = f"{harder:g} N at {1e3 * deeper:g} mm after {f:g} N at {1e3 * s:g} mm"
+                raise SensorError(
+                    f"the force of a padding must at most double to the next depth, got {was}: measure between"
+                )
+        slopes = [(harder - f) / (deeper - s) for (s, f), (deeper, harder) in pairwise(knots)]
+        slopes = slopes if self.table else [self.stiffness]
+        pieces = tuple((*knot, slope) for knot, slope in zip(knots, (*slopes, self.hard_stiffness), strict=True))
+        object.__setattr__(self, "pieces", pieces)
+
+    def scaled(self, factor: float) -> Padding:
+        """Return the padding with all its forces multiplied."""
+        stiffness, hard, table = factor * self.stiffness, factor * self.hard_stiffness, self.table
+        return replace(self, stiffness=stiffness, hard_stiffness=hard, table=tuple((s, factor * f) for s, f in table))
 
     def elastic(self, depth: float) -> float:
         """Return the force of an indentation at rest [N]; 0 without one."""
-        if depth <= 0.0:
-            return 0.0
-        beyond = max(0.0, depth - self.thickness)
-        return self.stiffness * (depth - beyond) + self.hard_stiffness * beyond
+        start, force, slope = next((piece for piece in reversed(self.pieces) if depth > piece[0]), (depth, 0.0, 0.0))
+        return force + slope * (depth - start)
 
     def force(self, depth: float, rate: float) -> float:
         """Return the force of an indentation [m] that grows at a rate [m/s], in N; never below 0."""
@@ -116,7 +145,6 @@ class Padding:
 
     def energy(self, depth: float) -> float:
         """Return the energy stored in an indentation [J]."""
-        if depth <= 0.0:
-            return 0.0
-        soft, beyond = min(depth, self.thickness), max(0.0, depth - self.thickness)
-        return 0.5 * self.stiffness * soft**2 + beyond * (self.stiffness * soft + 0.5 * self.hard_stiffness * beyond)
+        ends = (*(start for start, _, _ in self.pieces[1:]), math.inf)
+        ways = [max(0.0, min(depth, end) - piece[0]) for piece, end in zip(self.pieces, ends, strict=True)]
+        return sum(way * (f + 0.5 * slope * way) for way, (_, f, slope) in zip(ways, self.pieces, strict=True))

@@ -79,7 +79,8 @@ def by_scipy(contact: TwoMassContact, horizon: float, method: str, tolerance: fl
     def force(s: float, w: float) -> float:
         if state["mode"] == "free":
             return 0.0
-        e = law.soft * s if state["mode"] == "soft" else law.end_force + law.hard * (s - law.end)
+        begin, first, rate = law.pieces[state["mode"] == "hard"]
+        e = first + rate * (s - begin)
         return e * (1.0 + law.loss * w)
 
     def slope(t: float, y: Sequence[float]) -> list[float]:
@@ -102,7 +103,7 @@ def by_scipy(contact: TwoMassContact, horizon: float, method: str, tolerance: fl
 
     def peaks(t: float, y: Sequence[float]) -> float:
         """Growth of the force: with damping, it is greatest before the compression is."""
-        k = {"free": 0.0, "soft": law.soft, "hard": law.hard}[str(state["mode"])]
+        k = {"free": 0.0, "soft": law.pieces[0][2], "hard": law.pieces[1][2]}[str(state["mode"])]
         bare = force(y[0], 0.0)
         return k * y[1] * (1.0 + law.loss * y[1]) + bare * law.loss * slope(t, y)[1]
 
@@ -112,9 +113,12 @@ def by_scipy(contact: TwoMassContact, horizon: float, method: str, tolerance: fl
         end = min(limit for limit in (horizon, state["braked"], state["stands"]) if limit > t)
         names, events = [], []
         if state["mode"] == "soft":
-            names, events = ["hard", "free"], [event(lambda y: y[0] - law.end, 1.0), event(lambda y: y[0], -1.0)]
+            names, events = (
+                ["hard", "free"],
+                [event(lambda y: y[0] - law.pieces[1][0], 1.0), event(lambda y: y[0], -1.0)],
+            )
         elif state["mode"] == "hard":
-            names, events = ["soft"], [event(lambda y: y[0] - law.end, -1.0)]
+            names, events = ["soft"], [event(lambda y: y[0] - law.pieces[1][0], -1.0)]
         else:
             names, events = ["soft"], [event(lambda y: y[0], 1.0)]
         if not state["closed"]:
@@ -137,7 +141,11 @@ def by_scipy(contact: TwoMassContact, horizon: float, method: str, tolerance: fl
         if happened == "close":
             state["closed"], state["braked"] = True, t + arm.reaction
         elif happened:
-            y[0] = {"hard": law.end, "free": 0.0, "soft": 0.0 if state["mode"] == "free" else law.end}[happened]
+            y[0] = {
+                "hard": law.pieces[1][0],
+                "free": 0.0,
+                "soft": 0.0 if state["mode"] == "free" else law.pieces[1][0],
+            }[happened]
             state["mode"] = happened
         elif t == state["braked"]:
             drive[3], state["stands"] = arm.deceleration, t + drive[2] / arm.deceleration

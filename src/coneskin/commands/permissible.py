@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print(json.dumps(_plain(found)))
     else:
-        _print(found, args)
+        _print(found, args, limits.measured.deceleration)
     return 0
 
 
@@ -86,13 +86,15 @@ def _plain(found: SpeedMap) -> dict[str, Any]:
     return table
 
 
-def _print(found: SpeedMap, args: argparse.Namespace) -> None:
+def _print(found: SpeedMap, args: argparse.Namespace, measured: float) -> None:
     table = found.table
     print(f"limits: {table.edition}; transcribed by {table.transcribed_by}, verified by {table.verified_by}")
     print(
         f"the arm brakes {1e3 * table.reaction:g} ms after the layers close, with {table.deceleration:g} rad/s2 "
         f"({table.measured_by})"
     )
+    if table.deceleration < measured:
+        print(f"its motors hold no more there with its payload; {measured:g} rad/s2 were measured")
     where = "in the positions of the motion" if table.lowest else "in any position"
     print(f"permissible speed of a surface along its normal [m/s], {where}, over its lever [m/rad]:")
     print(f"{'sensor':20}{'limited by':>16}" + "".join(f"{lever:>8g}" for lever in table.levers))

@@ -27,7 +27,7 @@ def pressed(body: float, arm: float = 1e3, loss: float = 0.3) -> TwoMassContact:
 
 
 def start_of(model: TwoMassContact, s: float, w: float, x: float, v: float, way: float) -> ContactState:
-    return ContactState(s, w, x, v, way, 0.7, 3.0, model.law.soft * s, model.law.soft)
+    return ContactState(s, w, x, v, way, 0.7, 3.0, model.law.pieces[0][2] * s, model.law.pieces[0][2])
 
 
 def exact(model: TwoMassContact, start: ContactState, time: float) -> list[float]:
@@ -78,7 +78,7 @@ def test_each_series_keeps_the_equations_with_loss_at_the_points_and_between() -
     for time in np.linspace(0.0, length, 9):
         value = [polynomial.polyval(time, series) for series in (s, w, x, v, f)]
         slope = [polynomial.polyval(time, polynomial.polyder(series)) for series in (s, w, x, v)]
-        force = model.law.soft * value[0] * (1.0 + model.law.loss * value[1])
+        force = model.law.pieces[0][2] * value[0] * (1.0 + model.law.loss * value[1])
         assert value[4] == pytest.approx(force, rel=1e-9)
         assert slope[0] == pytest.approx(value[1], rel=1e-6)
         assert slope[2] == pytest.approx(value[3], rel=1e-6)

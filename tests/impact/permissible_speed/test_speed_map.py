@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +11,22 @@ import pytest
 
 from coneskin.core.errors import SceneError
 from coneskin.impact.permissible_speed import speed_map
-from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
+from coneskin.impact.permissible_speed.arm_patches import (
+    braking_held,
+    inertias_of,
+    motion_positions,
+    patches_of,
+    weigh,
+)
 from coneskin.impact.permissible_speed.extra_way import ExtraWay, extra_ways
 from coneskin.impact.permissible_speed.limits_file import ForceLimits, _parse_limits
 from coneskin.impact.permissible_speed.speed_map import LEVERS, _keeps, contact_at, map_speeds, write_map
 from coneskin.impact.permissible_speed.two_mass_contact import TwoMassContact
-from coneskin.robot.arm.inertia import arm_inertia
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.scene.tables.speed_limit_tables import limit_fingerprint
 from coneskin.skin.materials import Padding
 from coneskin.testing.scenes import forearm_scene
 from tests.support.effective_mass import effective_mass
@@ -91,6 +99,29 @@ def _speeds(found: object, row: object) -> tuple[tuple[float, ...], tuple[float,
     return curves[row.curve].speeds, curves[row.any_curve].speeds  # type: ignore[attr-defined]
 
 
+HEAVY = SCENE.replace('model = "UR5e"', 'model = "UR5e"\npayload_kg = {}\npayload_xyz_mm = [0, 0, 50]')
+
+
+def test_a_payload_makes_masses_heavier_and_the_braking_weaker() -> None:
+    """Of one joint at a time, by the torque that it takes: the worst is no better than any."""
+    scene = parse_scene(HEAVY.format(5.0))
+    assert scene.arm is not None
+    model, q = arm_model("UR5e"), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # stretched out, level
+    bare, laden = inertias_of(scene.arm)
+    assert laden.links[-1].mass == pytest.approx(bare.links[-1].mass + 5.0)
+    both = weigh(model, patches_of(scene), [q], (bare, laden))
+    assert both.shape == (2, 48)
+    assert np.all(both[1] >= both[0] * (1.0 - 1e-9))
+    held = braking_held(model, [q], (bare, laden))
+    assert 0.0 < held < 0.5 * braking_held(model, [q], (bare,))
+    worst = math.inf
+    for signs in product((-1.0, 1.0), repeat=6):
+        torques = joint_torques(model, laden, q, (0.0,) * 6, tuple(held * sign for sign in signs))
+        worst = min(worst, *(most - abs(torque) for most, torque in zip(laden.torque, torques, strict=True)))
+    assert worst == pytest.approx(0.0, abs=1e-6)
+    assert limit_fingerprint(scene) != limit_fingerprint(parse_scene(SCENE))
+
+
 @pytest.mark.parametrize(
     ("scene", "limits", "message"),
     [
@@ -98,6 +129,7 @@ def _speeds(found: object, row: object) -> tuple[tuple[float, ...], tuple[float,
         (SCENE.replace('kind = "stop"', 'kind = "slow"'), TEXT, "a reaction is slow"),
         (SCENE, TEXT.replace("deceleration_rad_s2 = 9", "deceleration_rad_s2 = 11"), "must not be above"),
         (SCENE, TEXT.replace('links = ["forearm"]', 'links = ["wrist_1"]'), "no .* may be struck by the forearm"),
+        (HEAVY.format(60.0), TEXT, "60 kg at payload_xyz_mm are too much for the motors"),
         (SCENE[SCENE.index("[padding]") : SCENE.index("[motion]")], TEXT, "need an \\[arm\\]"),
     ],
 )
@@ -116,7 +148,7 @@ def test_two_regions_of_one_name_keep_their_own_limits(monkeypatch: pytest.Monke
     speeds = []
     for regions in ((softer,), (hand, softer)):
         maker = speed_map._CurveMaker(replace(limits, regions=regions), Padding(), lambda _: None)
-        number = maker.number(3, 8.0, 8.0, ExtraWay())
+        number = maker.number(3, 8.0, 8.0, ExtraWay(), 9.0)
         speeds.append(maker.curves[number].speeds)
     assert speeds[0] == speeds[1]
 
@@ -133,5 +165,5 @@ def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest
     monkeypatch.setattr(speed_map, "_CURVE_MASSES", (8.0,))
     monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
     maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
-    without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag))].speeds for lag in (0.0, 0.8))
+    without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag), 9.0)].speeds for lag in (0.0, 0.8))
     assert with_it == without

@@ -15,7 +15,7 @@ def test_without_tissue_the_law_is_the_paddings() -> None:
     law = _CompressionLaw.of(padding)
     for depth in (0.0, 1e-3, 6e-3, 8e-3):
         assert law.under(padding.elastic(depth)) == pytest.approx(depth, rel=1e-14)
-    assert (law.soft, law.hard, law.end) == (padding.stiffness, padding.hard_stiffness, padding.thickness)
+    assert law.pieces == padding.pieces == ((0.0, 0.0, 10e3), (6e-3, 60.0, 1e6))
     assert law.loss == padding.loss
 
 

@@ -26,6 +26,17 @@ def test_a_scene_without_bodies_has_none_and_padding_is_the_assumed_one() -> Non
     assert parse_scene(ARM + "[padding]\nthickness_mm = 8\n").padding == Padding(thickness=8e-3)
 
 
+TABLE = "[padding]\ndepths_mm = [1, 2]\nforces_n = [5, 9.5]\n"
+
+
+def test_a_padding_is_a_table_of_force_over_depth() -> None:
+    padding = parse_scene(ARM + TABLE + "hard_n_per_mm = 500\n").padding
+    assert padding is not None
+    assert padding.table == ((0.001, 5.0), (0.002, 9.5))
+    depths = (-1e-3, 0.5e-3, 1e-3, 1.5e-3, 2e-3, 3e-3)
+    assert [padding.elastic(depth) for depth in depths] == pytest.approx([0.0, 2.5, 5.0, 7.25, 9.5, 509.5])
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -37,6 +48,17 @@ def test_a_scene_without_bodies_has_none_and_padding_is_the_assumed_one() -> Non
         (HAND.replace(ARM, ""), r"\[\[body\]\] needs an \[arm\]"),
         (ARM + "[body]\nkind = 1\n", "body must be a list of tables"),
         (ARM + "[padding]\nthickness_mm = 0\n", "padding.thickness_mm"),
+        (
+            ARM + "[padding]\ndepths_mm = [1, 2]\nforces_n = [5]\n",
+            "a force for each depth, got 2 depths_mm and 1 forces_n",
+        ),
+        (ARM + TABLE + "thickness_mm = 6\n", "depths_mm and forces_n stand in place of thickness_mm"),
+        (ARM + TABLE.replace("9.5", "4"), "must rise, got 4 N at 2 mm after 5 N at 1 mm"),
+        (
+            ARM + TABLE.replace("9.5", "10.5"),
+            "must at most double to the next depth, got 10.5 N at 2 mm .*: measure between",
+        ),
+        (ARM + TABLE + "spread = 1\n", "padding.spread"),
     ],
 )
 def test_mistakes_are_named(text: str, said: str) -> None:
@@ -57,6 +79,6 @@ def test_a_padding_is_a_spring_that_bottoms_out_and_never_pulls() -> None:
 
 @pytest.mark.parametrize("depth", [-1e-3, 2e-3, 5e-3, 8e-3])
 def test_the_energy_of_a_padding_is_the_integral_of_its_force(depth: float) -> None:
-    padding, n = Padding(thickness=5e-3), 20_000
-    steps = [padding.elastic(depth * (k + 0.5) / n) * depth / n for k in range(n)]
-    assert padding.energy(depth) == pytest.approx(sum(steps), rel=1e-6, abs=1e-15)
+    for padding in (Padding(thickness=5e-3), Padding(table=((1e-3, 5.0), (4e-3, 9.0), (7e-3, 17.0)))):
+        steps = [padding.elastic(depth * (k + 0.5) / 20_000) * depth / 20_000 for k in range(20_000)]
+        assert padding.energy(depth) == pytest.approx(sum(steps), rel=1e-6, abs=1e-15)

@@ -6,19 +6,21 @@ import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
-from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses, point_jacobian
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.scene.build import place_on_arm
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
     from coneskin.geometry.pose import Vector
+    from coneskin.robot.arm.inertia import ArmInertia
     from coneskin.robot.arm.model import ArmModel
-    from coneskin.scene.values.scene import Scene
+    from coneskin.scene.values.scene import ArmScene, Scene
 
 ALONG = 3  #: patches along a sheet: its two ends, and the middle
 AROUND = 16  #: around a whole turn
@@ -95,8 +97,32 @@ def motion_positions(scene: Scene) -> list[tuple[float, ...]]:
     return found
 
 
-def weigh(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> Floats:
-    """Return the effective mass at each patch in each position [kg], shape (positions, patches).
+def inertias_of(arm: ArmScene) -> tuple[ArmInertia, ...]:
+    """Return the inertia of an arm, bare and with all that it carries."""
+    bare = arm_inertia(arm.model)
+    return (bare, loaded(bare, arm.payload, arm.payload_xyz)) if arm.payload else (bare,)
+
+
+def braking_held(arm: ArmModel, positions: Sequence[Sequence[float]], inertias: Sequence[ArmInertia]) -> float:
+    """Return the deceleration of the leading joint that the motors hold beside gravity [rad/s^2]; negative without one.
+
+    It is the least of upright positions, with all joints braking as hard, in the worst directions.
+    """
+    found = math.inf
+    for q, inertia in product(positions, inertias):
+        weights = joint_torques(arm, inertia, q, ZERO_VELOCITY, ZERO_VELOCITY)
+        for row, weight, most in zip(mass_matrix(arm, inertia, q), weights, inertia.torque, strict=True):
+            found = min(found, (most - abs(weight)) / sum(map(abs, row)))
+    return found
+
+
+def weigh(
+    arm: ArmModel,
+    patches: Sequence[ArmPatch],
+    positions: Sequence[Sequence[float]],
+    inertias: Sequence[ArmInertia] = (),
+) -> Floats:
+    """Return the effective mass at each patch in each position [kg], with each inertia; shape (both, patches).
 
     It is infinite where no joint moves the patch along its normal. The joints are free in it. Held joints make an arm
     heavier, never lighter.
@@ -105,9 +131,9 @@ def weigh(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequen
     """
     import numpy as np
 
-    inertia = arm_inertia(arm)
-    found = np.empty((len(positions), len(patches)))
-    for row, q in enumerate(positions):
+    cases = list(product(positions, inertias or (arm_inertia(arm),)))
+    found = np.empty((len(cases), len(patches)))
+    for row, (q, inertia) in enumerate(cases):
         inverse = np.linalg.inv(np.array(mass_matrix(arm, inertia, q)))
         poses = link_poses(arm, q)
         lever = np.empty((len(patches), 6))

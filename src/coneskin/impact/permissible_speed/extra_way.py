@@ -29,6 +29,7 @@ from coneskin.robot.arm.kinematics import link_poses
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
+    from coneskin.robot.arm.inertia import ArmInertia
     from coneskin.robot.arm.model import ArmModel
 
     from .arm_patches import ArmPatch
@@ -86,19 +87,23 @@ class ExtraWay:
         return 1.0 + 0.5 * self.bend * min(angle, _MAX_EXTRA_WAY) / lever
 
 
-def extra_ways(arm: ArmModel, patches: Sequence[ArmPatch], positions: Sequence[Sequence[float]]) -> list[ExtraWay]:
-    """Return the largest lag and bend of each patch in some joint positions [rad]."""
+def extra_ways(
+    arm: ArmModel,
+    patches: Sequence[ArmPatch],
+    positions: Sequence[Sequence[float]],
+    inertias: Sequence[ArmInertia] = (),
+) -> list[ExtraWay]:
+    """Return the largest lag and bend of each patch in some joint positions [rad], with any of some inertias."""
     import numpy as np
 
-    inertia = arm_inertia(arm)
     lags, bends = np.zeros(len(patches)), np.zeros(len(patches))
     links = sorted({patch.link for patch in patches})
     for q in positions:
-        masses = np.array(mass_matrix(arm, inertia, q))
+        weights = [np.array(mass_matrix(arm, inertia, q)) for inertia in inertias or (arm_inertia(arm),)]
         for link in links:
             own = [number for number, patch in enumerate(patches) if patch.link == link]
             levers, changes = _levers_and_changes(arm, q, link, [patches[number] for number in own])
-            lags[own] = np.maximum(lags[own], _worst_lag(levers, masses))
+            lags[own] = np.max([lags[own], *(_worst_lag(levers, masses) for masses in weights)], axis=0)
             bends[own] = np.maximum(bends[own], _worst_bend(changes))
     return [ExtraWay(float(lag), float(bend)) for lag, bend in zip(lags, bends, strict=True)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -108,7 +109,7 @@ def _draw_curves(axes: Any, found: SpeedMap) -> None:
 
 def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -> None:
     """Draw the force over time at the permissible speed, for each region that limits one."""
-    padding = scene.padding or Padding()
+    padding, measured = scene.padding or Padding(), replace(limits.measured, deceleration=found.table.deceleration)
     times = [0.3 * n / 1500 for n in range(1501)]
     axes.set_xlim(0.0, 1e3 * times[-1])
     for region in limits.regions:
@@ -116,7 +117,7 @@ def _draw_forces(axes: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -
         if curve is None:
             continue
         speed = curve.speeds[_LEVER_INDEX]
-        contact = contact_at(speed, LEVERS[_LEVER_INDEX], curve.mass, region, limits.measured, padding, curve.extra)
+        contact = contact_at(speed, LEVERS[_LEVER_INDEX], curve.mass, region, measured, padding, curve.extra)
         course = integrate(contact)
         forces = [course.force(t) for t in times]
         (line,) = axes.plot([1e3 * t for t in times], forces, label=f"{region.name} at {speed:.2f} m/s")

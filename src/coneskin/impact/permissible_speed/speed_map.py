@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache, partial
 from pathlib import Path
@@ -28,7 +28,7 @@ from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerp
 from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene
 from coneskin.skin.materials import Padding
 
-from .arm_patches import motion_positions, patches_of, weigh
+from .arm_patches import braking_held, inertias_of, motion_positions, patches_of, weigh
 from .extra_way import ExtraWay, extra_ways
 from .limits_file import BodyRegion, ForceLimits, LimitsFile, MeasuredReaction
 from .taylor_integrator import integrate
@@ -53,6 +53,16 @@ def _keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
         return False  # known without a look at the course: the time to the closing makes it no better
     course = integrate(model, keep=False, stop_above=limits.transient)
     return course.peak <= limits.transient and max(course.last, course.rest) <= limits.lasting
+
+
+def softest(padding: Padding, limits: ForceLimits) -> tuple[Padding, ForceLimits]:
+    """Return the softest padding within the spread of one, and the limits with which it keeps those of all of them.
+
+    It is pressed the deepest; there, the force of another is at most (1 + spread) / (1 - spread) times its.
+    """
+    low = 1.0 - padding.spread
+    share = low / (1.0 + padding.spread)
+    return padding.scaled(low), ForceLimits(share * limits.transient, share * limits.lasting)
 
 
 def permissible_speed(
@@ -99,6 +109,7 @@ _IMMOVABLE_MASS = 1e6  # kg; no contact slows it down, but where it brakes it go
 _NO_WAY = ExtraWay()
 _POSITION_COUNT = 300  # joint positions that are looked at where the arm may be anywhere
 _SAMPLING_FACTOR = 1.1  # factor for what they may miss of the most
+_LEAST_BRAKING = 0.1  # rad/s^2; less counts as none
 _MAX_CONTACT_SPEED = 100.0  # m/s of a contact
 _MOTION_MARGIN = 0.05  # rad around a motion, within which its curves hold
 
@@ -204,14 +215,23 @@ def map_speeds(
     lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
     assert scene.arm is not None  # or there were no patches
     arm = arm_model(scene.arm.model)
-    everywhere = extra_ways(arm, patches, _any_positions(arm))
+    inertias, positions = inertias_of(scene.arm), _any_positions(arm)
+    everywhere = extra_ways(arm, patches, positions, inertias)
     extras = everywhere
+    braking = limits.measured.deceleration
+    any_braking = held = min(braking, max(_LEAST_BRAKING, braking_held(arm, positions, inertias) / _SAMPLING_FACTOR))
     lowest: tuple[float, ...] = ()
     highest: tuple[float, ...] = ()
     if not free and scene.motion is not None:
         positions = motion_positions(scene)
-        weights = weigh(arm, patches, positions)
-        extras = extra_ways(arm, patches, positions)
+        weights = weigh(arm, patches, positions, inertias)
+        extras = extra_ways(arm, patches, positions, inertias)
+        held = min(braking, braking_held(arm, positions, inertias))
+        if held < _LEAST_BRAKING:
+            why = (
+                f"{scene.arm.payload:g} kg at payload_xyz_mm are too much for the motors in a position of the [motion]"
+            )
+            raise SceneError([f"{why}: they hold no braking of {_LEAST_BRAKING:g} rad/s2"], scene.name)
         lightest, masses = weights.min(axis=0).tolist(), weights.max(axis=0).tolist()
         lowest = tuple(min(values) - _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
         highest = tuple(max(values) + _MOTION_MARGIN for values in zip(*scene.motion.waypoints, strict=True))
@@ -219,8 +239,9 @@ def map_speeds(
     rows = []
     most = {link: _most([*extras, *everywhere], link, patches) for link in {patch.link for patch in patches}}
     for patch, light, heavy, extra in zip(patches, lightest, masses, extras, strict=True):
-        anywhere = maker.number(patch.link, 0.0, math.inf, most[patch.link])
-        own = anywhere if free else maker.number(patch.link, light, heavy, extra.rounded_up().up_to(most[patch.link]))
+        anywhere = maker.number(patch.link, 0.0, math.inf, most[patch.link], any_braking)
+        nearer = extra.rounded_up().up_to(most[patch.link])
+        own = anywhere if free else maker.number(patch.link, light, heavy, nearer, held)
         rows.append(LimitedPatch(patch.sensor, patch.u, patch.phi, own, anywhere))
     found = maker.curves
     _check_speeds(scene, found)
@@ -233,7 +254,7 @@ def map_speeds(
         verified_by=limits.verified_by,
         measured_by=limits.measured.by,
         reaction=limits.measured.reaction,
-        deceleration=limits.measured.deceleration,
+        deceleration=held,
         lowest=lowest,
         highest=highest,
         levers=LEVERS,
@@ -263,41 +284,47 @@ class _CurveMaker:
 
     def __init__(self, limits: LimitsFile, padding: Padding, note: Callable[[str], None]) -> None:
         self.curves: list[_SpeedCurve] = []
-        self._limits, self._padding, self._note = limits, padding, note
+        self._limits, self._note = limits, note
+        self._padding = padding
         self._number, self._search = cache(self._new_number), cache(self._new_search)
 
-    def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay) -> int:
-        """Return the number of the curve of a link, for a range of masses [kg] and an extra way."""
+    def number(self, link: int, lightest: float, heaviest: float, extra: ExtraWay, braking: float) -> int:
+        """Return the number of a link's curve, for a range of masses [kg], an extra way and a braking [rad/s^2]."""
         regions = tuple(region for region in self._limits.regions if not region.links or link in region.links)
         first = max((n for n, mass in enumerate(_CURVE_MASSES) if mass <= lightest), default=0)
         last = min(n for n, mass in enumerate(_CURVE_MASSES) if mass >= heaviest)
-        return self._number(regions, _CURVE_MASSES[first : last + 1], extra)
+        return self._number(regions, _CURVE_MASSES[first : last + 1], extra, braking)
 
-    def _new_number(self, regions: tuple[BodyRegion, ...], masses: tuple[float, ...], extra: ExtraWay) -> int:
-        least = min((self._search(r, mass, extra)[-1], r.name) for r in regions for mass in masses)[1]
-        speeds = zip(*(self._search(region, mass, extra) for region in regions for mass in masses), strict=True)
+    def _new_number(
+        self, regions: tuple[BodyRegion, ...], masses: tuple[float, ...], extra: ExtraWay, braking: float
+    ) -> int:
+        found = [(self._search(region, mass, extra, braking), region.name) for region in regions for mass in masses]
+        least = min((row[-1], name) for row, name in found)[1]
+        speeds = zip(*(row for row, _ in found), strict=True)
         curve = _SpeedCurve(least, masses[-1], extra, tuple(map(min, speeds)))
         if curve not in self.curves:
             self.curves.append(curve)
         return self.curves.index(curve)
 
-    def _new_search(self, region: BodyRegion, mass: float, extra: ExtraWay) -> tuple[float, ...]:
+    def _new_search(self, region: BodyRegion, mass: float, extra: ExtraWay, braking: float) -> tuple[float, ...]:
         """Return the permissible speeds of one mass against one region, for each lever."""
         self._note(f"{region.name} struck by {mass:g} kg")
         speeds: list[float] = []
+        measured = replace(self._limits.measured, deceleration=braking)
+        padding, limits = softest(self._padding, region.limits)
         for number, lever in enumerate(LEVERS):
 
             def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
-                common = region, self._limits.measured, self._padding
+                common = region, measured, padding
                 return [contact_at(speed, lever, mass, *common, way) for way in ways]
 
             least, top = _LEAST_SPEED, _TOP_SPEED
             if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
                 least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
-            found = permissible_speed(contacts, region.limits, least, top)
+            found = permissible_speed(contacts, limits, least, top)
             both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
-            if found > 0.0 and not all(_keeps(contact, region.limits) for contact in both(found)):
-                found = permissible_speed(both, region.limits, least, top)
+            if found > 0.0 and not all(_keeps(contact, limits) for contact in both(found)):
+                found = permissible_speed(both, limits, least, top)
             speeds.append(found)
         for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
             speeds[number] = min(speeds[number], speeds[number + 1])
@@ -308,7 +335,7 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
     problems = []
     if scene.padding is None:
         problems.append(
-            "permissible speeds need the [padding] of the skins; press yours on a scale (docs/do/impact.md)"
+            "permissible speeds need the [padding] of the skins; press yours on a scale (docs/do/padding.md)"
         )
     for reaction in (scene.default_reaction, *(rule.reaction for rule in scene.rules)):
         braking = reaction.deceleration

@@ -1,9 +1,10 @@
 """Integrator of a contact: Taylor series between events that are located on them.
 
-The equations of ``two_mass_contact`` are polynomials between events: contact, bottoming out, closing of the layers, the
-beginning and the end of braking, separation. There the Taylor coefficients follow from each other by products of
-series, so that a step of order 18 costs little more than a dozen evaluations, and an event is a root of a polynomial
-that is there already. No step of it is ever repeated, and none has to creep across a kink.
+The equations of ``two_mass_contact`` are polynomials between events: contact, the ends of the straight pieces of the
+force, closing of the layers, the beginning and the end of braking, separation. There the Taylor coefficients follow
+from each other by products of series, so that a step of order 18 costs little more than a dozen evaluations, and an
+event is a root of a polynomial that is there already. No step of it is ever repeated, and none has to creep across a
+kink.
 
 A light body that a heavy arm presses swings or creeps within microseconds, and from then on follows the arm. Once
 friction has ended that motion, an implicit step is tried: collocation at Radau points. It is L-stable, as long as the
@@ -186,7 +187,7 @@ _STEPS_TO_IMPLICIT = 6  # steps without an event before an implicit one is tried
 _MAX_STEPS = 2_000_000
 _SETTLED_SHARE = 1e-11  # of the force at rest, below which a vibration is over, or a tenth of the tolerance
 _SETTLED_COARSE = 1e-4  # of the force at rest, where only peak and rest are asked for
-_FREE, _SOFT, _HARD, _RELEASED = range(4)  #: apart; padding; bottomed out; receding faster than the padding follows
+_FREE, _RELEASED = -1, -2  # apart; receding faster than the padding follows; 0 and up: in that piece of the force
 
 _Step = tuple[Sequence[Sequence[float]], float, tuple[float, float, float, float] | None]
 
@@ -228,7 +229,7 @@ class _Integration:
         self.time = 0.0
         self.s, self.w, self.x, self.v = 0.0, arm.speed, 0.0, 0.0
         self.way, self.drive, self.braking = 0.0, arm.speed, 0.0  # p, p', -p''
-        self.mode = _SOFT if arm.speed > 0.0 else _FREE
+        self.mode = 0 if arm.speed > 0.0 else _FREE
         self.closed, self.braked, self.stands = math.inf, math.inf, math.inf
         if model.closing_force == 0.0:
             self._close()
@@ -241,12 +242,10 @@ class _Integration:
 
     def _state(self) -> ContactState:
         """Return the state; without contact no force and no slope of it."""
-        law = self.law
         elastic, slope = 0.0, 0.0
-        if self.mode == _SOFT:
-            elastic, slope = law.soft * self.s, law.soft
-        elif self.mode == _HARD:
-            elastic, slope = law.end_force + law.hard * (self.s - law.end), law.hard
+        if self.mode >= 0:
+            begin, force, slope = self.law.pieces[self.mode]
+            elastic = force + slope * (self.s - begin)
         return ContactState(self.s, self.w, self.x, self.v, self.way, self.drive, self.braking, elastic, slope)
 
     def _by_series(self, room: float) -> _Step:
@@ -266,9 +265,7 @@ class _Integration:
 
     def _by_collocation(self, room: float) -> _Step | None:
         """Return a step of many times the length, where the fastest motion has died away; None where it has not."""
-        if self.mode not in (_SOFT, _HARD) or (
-            not self.ahead and (self.calm < self.patience or self.faded < self.faded_exponent)
-        ):
+        if self.mode < 0 or (not self.ahead and (self.calm < self.patience or self.faded < self.faded_exponent)):
             return None
         start = self._state()
         tried = self.ahead or _MIN_GAIN * self.pace  # shorter ones cost more than the series
@@ -291,10 +288,10 @@ class _Integration:
         if self.mode == _FREE:
             return [("touch", _shifted(s, 0.0), -1.0)]
         found: list[tuple[str, Sequence[float], float]] = []
-        if self.mode == _SOFT:
-            found += [("part", s, 1.0), ("bottom", _shifted(s, -law.end), -1.0)]
-        elif self.mode == _HARD:
-            found.append(("rise", _shifted(s, -law.end), 1.0))
+        if self.mode >= 0:
+            found.append(("rise" if self.mode else "part", _shifted(s, -law.pieces[self.mode][0]), 1.0))
+            if self.mode + 1 < len(law.pieces):
+                found.append(("sink", _shifted(s, -law.pieces[self.mode + 1][0]), -1.0))
         else:
             found += [("part", s, 1.0), ("follow", _shifted(w, 1.0 / law.loss), -1.0)]
         if law.loss and self.mode != _RELEASED:
@@ -348,16 +345,16 @@ class _Integration:
         law = self.law
         if event in ("touch", "part"):
             self.s = 0.0
-            self.mode = _SOFT if event == "touch" else _FREE
+            self.mode = 0 if event == "touch" else _FREE
             if event == "touch" and law.loss and 1.0 + law.loss * self.w <= 0.0:
                 self.mode = _RELEASED
-        elif event in ("bottom", "rise"):
-            self.s = law.end
-            self.mode = _HARD if event == "bottom" else _SOFT
+        elif event in ("sink", "rise"):
+            self.s = law.pieces[self.mode + (event == "sink")][0]
+            self.mode += 1 if event == "sink" else -1
         elif event == "release":
             self.mode = _RELEASED
         elif event == "follow":
-            self.mode = _SOFT if self.s <= law.end else _HARD
+            self.mode = law.piece_at(self.s)
         elif event == "close":
             self._close()
 
@@ -380,13 +377,13 @@ class _Integration:
 
     def _settled(self) -> bool:
         """Tell whether nothing is left but the equilibrium: the arm stands, and so little moves that no force shows."""
-        if self.drive > 0.0 or self.mode not in (_SOFT, _HARD):
+        if self.drive > 0.0 or self.mode < 0:
             return False
         force, s = self.model.static(self.way)
         law, arm, body = self.law, self.model.arm, self.model.body
-        if force <= 0.0 or (s > law.end) != (self.mode == _HARD):
+        if force <= 0.0 or law.piece_at(s) != self.mode:
             return False
-        slope = law.hard if self.mode == _HARD else law.soft
+        slope = law.pieces[self.mode][2]
         off, x = self.s - s, (force / body.support if body.support and self.body_mobility else 0.0)
         energy = 0.5 * slope * off * off
         if self.arm_mobility:

@@ -90,38 +90,31 @@ class StruckBody:
 
 @dataclass(frozen=True, slots=True)
 class _CompressionLaw:
-    """Force over the compression of padding and tissue in series: two straight pieces, and a factor for the speed.
+    """Force over the compression of padding and tissue in series: straight pieces, and a factor for the speed.
 
     Attributes:
-        soft: slope until the padding bottoms out [N/m].
-        hard: slope beyond [N/m].
-        end: compression at which it bottoms out [m].
-        loss: damping [s/m], by the share that the padding has in the compression until then.
+        pieces: compression [m], force [N] and slope [N/m] from where each begins.
+        loss: damping [s/m], by the share that the whole padding has in the compression.
     """
 
-    soft: float
-    hard: float
-    end: float
+    pieces: tuple[tuple[float, float, float], ...]
     loss: float
 
     @classmethod
     def of(cls, padding: Padding, tissue: float = math.inf) -> _CompressionLaw:
         """Return the law of a padding on a tissue [N/m]."""
-        soft = 1.0 / (1.0 / padding.stiffness + 1.0 / tissue)
-        hard = 1.0 / (1.0 / padding.hard_stiffness + 1.0 / tissue)
-        end = padding.stiffness * padding.thickness / soft
-        return cls(soft, hard, end, padding.loss * soft / padding.stiffness)
+        pieces = tuple((s + f / tissue, f, 1.0 / (1.0 / slope + 1.0 / tissue)) for s, f, slope in padding.pieces)
+        whole, force, _ = padding.pieces[-1]
+        return cls(pieces, padding.loss * whole / (whole + force / tissue))
 
-    @property
-    def end_force(self) -> float:
-        """Force at rest at which the padding bottoms out [N]."""
-        return self.soft * self.end
+    def piece_at(self, s: float) -> int:
+        """Return the number of the piece that a compression is in."""
+        return max(0, sum(piece[0] < s for piece in self.pieces) - 1)
 
     def under(self, force: float) -> float:
         """Return the compression at rest under a force [m]."""
-        if force <= self.end_force:
-            return max(0.0, force) / self.soft
-        return self.end + (force - self.end_force) / self.hard
+        s, f, slope = next(piece for piece in reversed(self.pieces) if force >= piece[1] or not piece[1])
+        return s + max(0.0, force - f) / slope
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,13 +157,12 @@ class TwoMassContact:
         """Return force [N] and compression [m] once all is at rest, with the controller's surface at a place [m]."""
         if way <= 0.0:
             return 0.0, min(0.0, way)
-        law, yielding = self.law, self.yielding
+        yielding = self.yielding
         if math.isinf(yielding):
             return 0.0, 0.0
-        force = way / (1.0 / law.soft + yielding)
-        if force > law.end_force:
-            force = (way - law.end + law.end_force / law.hard) / (1.0 / law.hard + yielding)
-        return force, law.under(force)
+        s, f, slope = next(piece for piece in reversed(self.law.pieces) if way >= piece[0] + piece[1] * yielding)
+        more = (way - s - f * yielding) / (1.0 / slope + yielding)
+        return f + more, s + more / slope
 
 
 def _check(

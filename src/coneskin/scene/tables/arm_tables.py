@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError, SensorError
 from coneskin.core.keys import Key, check
 from coneskin.scene.values.scene import ArmScene, BodyScene, MotionScene
 
@@ -153,4 +153,14 @@ def _padding(table: Mapping[str, Any], problems: list[str]) -> Padding:
     from coneskin.skin.materials import Padding
 
     values = check(table, k.PADDING_KEYS, "padding", problems)
-    return Padding(values["thickness"], values["stiffness"], values["hard"], values["loss"])
+    thickness, stiffness, depths, forces, spread, hard, loss = values.values()
+    if (depths or forces) and table.keys() & {"thickness_mm", "stiffness_n_per_mm"}:
+        problems.append("padding: depths_mm and forces_n stand in place of thickness_mm and stiffness_n_per_mm")
+    if len(depths) != len(forces):
+        problems.append(f"padding needs a force for each depth, got {len(depths)} depths_mm and {len(forces)} forces_n")
+        return Padding()
+    try:
+        return Padding(thickness, stiffness, hard, loss, tuple(zip(depths, forces, strict=True)), spread)
+    except SensorError as exc:
+        problems.append(f"padding: {exc}")
+        return Padding()

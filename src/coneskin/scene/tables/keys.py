@@ -36,6 +36,8 @@ ARM_KEYS = with_meanings(
         of coneskin (external)
     table_z_mm: height in the base frame below which the middle of no link goes in a retreat. Add the thickness of
         the arm and the length of the tool
+    payload_kg: the heaviest that the flange carries, tool included, for the permissible speeds
+    payload_xyz_mm: its centre of mass in the flange's frame
     slider_stop: the guard takes the controller's speed slider, and sets it to 0, where other stops do not work. Set
         it to false for a program that must keep the slider, such as one with ur_rtde's `RTDEIOInterface`
     speed_limit_from: file of permissible speeds that `coneskin permissible` has written. The guard keeps them by
@@ -48,6 +50,8 @@ ARM_KEYS = with_meanings(
     Key("watchdog_hz", float, 4.0, low=1.0, high=100.0),
     Key("control", str, "internal", choices=("internal", "external")),
     Key("table_z_mm", float, None, low=-5000.0, high=5000.0),
+    Key("payload_kg", float, 0.0, low=0.0, high=100.0),
+    Key("payload_xyz_mm", list, (0.0, 0.0, 0.0), low=-2000.0, high=2000.0, length=3),
     Key("slider_stop", bool, True),
     Key("speed_limit_from", str, None),
     Key("controller_heartbeat", str, "optional", choices=("required", "optional")),
@@ -258,11 +262,17 @@ PADDING_KEYS = with_meanings(
     """
     thickness_mm: indentation at which it bottoms out
     stiffness_n_per_mm: until there, for a body of the size of a hand
+    depths_mm: indentations that you have measured, in place of both, rising from above 0
+    forces_n: the force of each, at most doubling from one to the next
+    spread: share by which the force of any indentation may be off, for the permissible speeds
     hard_n_per_mm: stiffness beyond
     loss_s_per_m: damping: the force of an indentation at 1 m/s is 1 + this times that at rest
     """,
     Key("thickness_mm", float, 6e-3, low=0.1, high=100.0),
     Key("stiffness_n_per_mm", float, 10e3, low=0.1, high=10_000.0),
+    Key("depths_mm", list, (), low=0.0, high=100.0),
+    Key("forces_n", list, (), low=0.0, high=100_000.0),
+    Key("spread", float, 0.15, low=0.0, high=0.9),
     Key("hard_n_per_mm", float, 1e6, low=1.0, high=100_000.0),
     Key("loss_s_per_m", float, 0.3, low=0.0, high=10.0),
 )

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.scene.values.scene import Scene
 
-_MODEL_NUMBER = 1  # part of the fingerprint: raise it where the computation changes, so that computed files are void
+_MODEL_NUMBER = 2  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
 _MAX_LINES = 10  # of mistakes
 _HOW_TO = "run `coneskin permissible`, and name what it writes"
@@ -41,7 +41,7 @@ def limit_fingerprint(scene: Scene) -> str:
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     facts = {
         "model": _MODEL_NUMBER,
-        "arm": scene.arm.model if scene.arm else None,
+        "arm": [scene.arm.model, scene.arm.payload, scene.arm.payload_xyz] if scene.arm else None,
         "sheets": [
             [link.name, link.frame, item.sensor.name, asdict(item.sensor.frustum), *_place(item.placed)]
             for link in scene.links

@@ -153,6 +153,8 @@ class ArmScene:
         slider_stop: the guard takes the controller's speed slider, as one more way to stop the arm.
         controller_heartbeat: "required": a program that the controller does not end without the guard's heartbeat is
             stopped; "optional": it is reported.
+        payload: the heaviest that the flange carries, tool included [kg].
+        payload_xyz: its centre of mass in the flange's frame [m].
         table_z: height in the base frame that the arm does not go below while it retreats [m], or None.
     """
 
@@ -163,6 +165,8 @@ class ArmScene:
     table_z: float | None = None
     slider_stop: bool = True
     controller_heartbeat: str = "optional"
+    payload: float = 0.0
+    payload_xyz: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
