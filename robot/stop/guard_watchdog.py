@@ -113,6 +113,8 @@ class _GuardWatchdog:
             self._guard.send(StatusReport("error", what).encode())
             hold.begin()
         if gone and now - self._left_at > _ORPHAN_TIME and hold.states_missing():
+            if hold.stopping:  # nothing was said of this stop yet
+                self._session.send(encode_json({"stands": False}))
             return False
         return hold.stopping or not (gone and self._left_at < math.inf and (hold.stands or hold.failed))
 

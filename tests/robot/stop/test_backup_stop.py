@@ -2,10 +2,13 @@
 
 import pytest
 
+from coneskin.core.channel import Channel, decode_json, pair
 from coneskin.core.errors import RobotConnectionError
+from coneskin.robot.driver.messages import LEAVE, Heartbeat
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.stop import arm_stop as module
 from coneskin.robot.stop.backup_stop import StandstillHold
+from coneskin.robot.stop.guard_watchdog import _GuardWatchdog
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.driver import UR_DRIVER
@@ -204,3 +207,27 @@ def test_a_program_that_starts_again_gets_a_protective_stop_until_the_controller
     world.safety = 0b10000000100
     assert let_pass(world, hold, 0.01) == 1
     assert hold.stands is True
+
+
+@pytest.mark.parametrize("talks", [False, True])
+def test_a_watchdog_that_is_left_alone_leaves_within_two_seconds_only_where_no_state_comes(world, talks):
+    world.talks = talks
+    (guard, of_guard), (session, program) = (map(Channel, pair()) for _ in range(2))
+    world.fileno = session.fileno
+    hold = StandstillHold(world, world, MonitoringLimits(), 10.0, clock=world.clock)
+    watchdog = _GuardWatchdog(guard, session, hold, second=True, clock=world.clock)
+    of_guard.send(Heartbeat().encode())
+    assert watchdog.poll(0.0)
+    of_guard.close()
+    program.send(LEAVE)
+    left = world.now
+    while watchdog.poll(0.0) and world.now - left < 3.0:
+        pass
+    assert StopPath.PROGRAM in world.paths()
+    if talks:  # and show that it moves
+        assert world.now - left >= 3.0
+    else:
+        assert 1.0 < world.now - left < 1.5
+        assert [decode_json(message) for message in program.receive()] == [{"stands": False}]
+    for channel in (guard, of_guard, session, program):
+        channel.close()
