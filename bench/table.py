@@ -82,10 +82,8 @@ BENCHES = {
     "field-extremes": Bench("bench.field.extremes", "Run time.", one_thread=True),
     "field-reference": Bench("bench.field.reference", "Solvers other than NGSolve."),
     "firmware": Bench("bench.firmware.timing", "Sample-and-hold and non-linearity of the converter; real hardware."),
-    "board-spice": Bench(
-        "bench.firmware.board_spice", "Stray inductance, radio, and parts that are not as their data sheets."
-    ),
-    "boards": Bench("bench.firmware.boards", "Parts that are not as their data sheets, radio, and discharges."),
+    "board-spice": Bench("bench.firmware.board_spice", "Radio, stray inductance."),
+    "boards": Bench("bench.firmware.boards", "Radio, discharges."),
     "firmware-guard": Bench("bench.firmware.guard", _SIMULATED_ARM + " The board is emulated."),
     # sheets for links
     "design-map": Bench("bench.design.map", "Links of other shapes."),

@@ -1,9 +1,12 @@
 """Command ``coneskin firmware``: what it writes for each board."""
 
 import csv
+import os
 import re
+import shutil
 import xml.etree.ElementTree as ET
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 
@@ -182,3 +185,41 @@ def test_of_a_design_with_two_sheets_both_are_named(tmp_path, capsys):
         said = capsys.readouterr().err
         assert str(tmp_path / "sheet-1" / "sensor.toml") in said
         assert str(tmp_path / "sheet-2" / "sensor.toml") in said
+
+
+AVR = shutil.which("avr-gcc") is not None and Path("/usr/share/arduino/hardware/arduino/avr").is_dir()
+AVRDUDE = """#!/bin/sh
+echo "$@" >> {log}
+case "$*" in *"-b {baud}"*) for last; do :; done;; *) echo "avrdude: not in sync" >&2; exit 1;; esac
+for word; do case "$word" in flash:w:*) cp "$(echo "$word" | cut -d: -f3)" {log}.elf;; esac; done
+"""
+
+
+@pytest.mark.long
+@pytest.mark.processes
+@pytest.mark.skipif(not AVR, reason="no compiler: apt-get install gcc-avr avr-libc arduino-core-avr")
+@pytest.mark.parametrize("baud", ["115200", "57600", "none"])
+def test_the_sketch_is_compiled_and_handed_to_the_programmer(sensor_file, tmp_path, monkeypatch, capsys, baud):
+    tool = tmp_path / "bin" / "avrdude"
+    tool.parent.mkdir()
+    tool.write_text(AVRDUDE.format(log=tmp_path / "log", baud=baud), encoding="ascii")
+    tool.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tool.parent}:{os.environ['PATH']}")
+    code, _ = write(sensor_file, "--flash", "/dev/ttyNONE")
+    said = capsys.readouterr()
+    asked = (tmp_path / "log").read_text(encoding="ascii").splitlines()
+    assert all("-p atmega328p -c arduino -P /dev/ttyNONE -D" in line for line in asked)
+    if baud == "none":
+        assert code == 1
+        assert "avrdude cannot write to the board at /dev/ttyNONE: avrdude: not in sync" in said.err
+        return
+    assert code == 0
+    assert "flashed the board at /dev/ttyNONE" in said.out
+    assert len(asked) == ("115200", "57600").index(baud) + 1
+    assert b"coneskin firmware=" in (tmp_path / "log.elf").read_bytes()
+
+
+def test_without_a_compiler_it_says_what_to_install(sensor_file, monkeypatch, capsys):
+    monkeypatch.setenv("PATH", "")
+    assert write(sensor_file, "--board", "pico", "--flash", "/dev/ttyNONE")[0] == 1
+    assert "install arduino-cli with the core of rp2040:rp2040:rpipico" in capsys.readouterr().err

@@ -7,17 +7,34 @@ example:
 
 The folder then holds the sketch (coneskin/coneskin.ino), wiring.svg, board.md with pins, cable, first steps, settings
 and what the scene must say, parts.csv, board.net for KiCad, and frame_vectors.csv: 50 frames with which other firmware
-is tested.
+is tested. With --flash the sketch goes onto the board too: by avr-gcc and avrdude for an Uno or Nano (Debian: apt-get
+install gcc-avr avr-libc arduino-core-avr avrdude), else by arduino-cli, where one of them is installed.
 Files that are there already and are others, such as a sketch of your own, are not replaced without --force.
-Exit code: 0 written, 1 not written.
+Exit code: 0 written, 1 not written or not flashed.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
+import subprocess
+from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
-from coneskin.core.errors import GeometryError, SceneError
+from coneskin.core.errors import GeometryError, SceneError, SkinConnectionError
+
+if TYPE_CHECKING:
+    from coneskin.skin.firmware.board_circuit import BoardCircuit
+
+_AVR_CORE = Path("/usr/share/arduino/hardware/arduino/avr")  # of Debian's arduino-core-avr
+_AVR_OPTIONS = (
+    *("-mmcu=atmega328p", "-DF_CPU=16000000L", "-DARDUINO=10819", "-DARDUINO_AVR_UNO", "-DARDUINO_ARCH_AVR"),
+    *("-Os", "-w", "-std=gnu++11", "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections", "-fno-exceptions"),
+    *("-fno-threadsafe-statics", "-DDECIMAL_DIG=__DECIMAL_DIG__"),  # which this compiler defines for C only
+)
+_BOOTLOADER_BAUDS = ("115200", "57600")  # bit/s; of an Uno, and of a Nano with the old bootloader
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     help_text = "the board's own, or two ADS1x15 on its I2C pins (default: %(default)s)"
     add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help=help_text)
     add("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
+    add("--flash", metavar="PORT", help="compile the sketch and write it onto the board at this port")
     add("--force", action="store_true", help="replace files that are there already and are others")
 
 
@@ -68,8 +86,82 @@ def run(args: argparse.Namespace) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     print(f"wrote firmware, wiring and parts to {args.to}, for: {circuit.facts.title}")
+    if args.flash:
+        _flash(args.to / "coneskin", circuit, args.flash)
+        print(f"flashed the board at {args.flash}")
     print(f"next: wire it as in {args.to / 'wiring.svg'} and flash it as in {args.to / 'board.md'}")
     board = f"--board {args.board}" + (f" --converter {args.converter}" if circuit.converter else "")
     print("of several sheets each has a board: the second gets `sensor=1`, as in its board.md, and a --port of its own")
     print(f"then: coneskin init DESIGN-FOLDER {board} --port /dev/ttyACM0 --arm MODEL --host ADDRESS")
     return 0
+
+
+def _flash(sketch: Path, circuit: BoardCircuit, port: str) -> None:
+    """Compile a sketch and write it onto a board, by what is installed.
+
+    Raises:
+        SkinConnectionError: nothing that can is installed, it does not compile, or the board does not take it.
+    """
+    board, target = circuit.board.name, circuit.facts.target
+    if board == "uno" and all(map(shutil.which, ("avr-gcc", "avrdude"))) and _AVR_CORE.is_dir():
+        with TemporaryDirectory() as folder:
+            program = _compile_for_uno(sketch, Path(folder))
+            words = [
+                "avrdude",
+                "-q",
+                "-p",
+                "atmega328p",
+                "-c",
+                "arduino",
+                "-P",
+                port,
+                "-D",
+                "-U",
+                f"flash:w:{program}:e",
+            ]
+            said: list[str] = []
+            for baud in _BOOTLOADER_BAUDS:
+                if not (why := _said([*words, "-b", baud])):
+                    return
+                said.append(why)
+            raise SkinConnectionError(f"avrdude cannot write to the board at {port}: {said[0]}")
+    elif shutil.which("arduino-cli"):
+        _run(["arduino-cli", "compile", "--upload", "--fqbn", target, "--port", port, str(sketch)])
+    else:
+        packages = "gcc-avr avr-libc arduino-core-avr avrdude (apt-get), or " if board == "uno" else ""
+        raise SkinConnectionError(
+            f"no compiler for a {circuit.facts.title}: install {packages}arduino-cli with the core of {target}"
+        )
+
+
+def _compile_for_uno(sketch: Path, folder: Path) -> Path:
+    """Compile a sketch's folder for an Uno or Nano with Debian's Arduino core; return the program, an ELF file.
+
+    Args:
+        sketch: the folder ``coneskin``.
+        folder: where the program goes.
+
+    Raises:
+        SkinConnectionError: the compiler refuses it; the message is its own.
+    """
+    core, wire = _AVR_CORE / "cores/arduino", _AVR_CORE / "libraries/Wire/src"
+    places = (core, _AVR_CORE / "variants/standard", _AVR_CORE / "libraries/EEPROM/src", wire, sketch)
+    source, program = folder / "coneskin.cpp", folder / "coneskin.elf"
+    source.write_bytes(b"#include <Arduino.h>\n" + (sketch / "coneskin.ino").read_bytes())
+    files = [source, *(path for end in ("c", "cpp", "S") for path in sorted(core.glob(f"*.{end}")))]
+    files += [wire / "Wire.cpp", wire / "utility/twi.c"]
+    words = ["avr-gcc", *_AVR_OPTIONS, *(f"-I{place}" for place in places), *map(str, files), "-lm", "-o", str(program)]
+    _run(words)
+    return program
+
+
+def _run(words: Sequence[str]) -> None:
+    if said := _said(words):
+        raise SkinConnectionError(f"{words[0]} failed: {said}")
+
+
+def _said(words: Sequence[str]) -> str:
+    """Run a program; return its last words where it failed, else nothing."""
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300.0, check=False)
+    lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
+    return "" if done.returncode == 0 else "; ".join(lines[-3:]) or f"exit code {done.returncode}"

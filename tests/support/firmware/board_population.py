@@ -2,7 +2,7 @@
 
 Each board is a network of nine nodes with values drawn from the limits of parts.toml, solved for each temperature; no
 formula of a decoder is used. Its frames go to a detector that knows the nominal values only. First a run at the
-board's rate: ready, then three touches. Then an hour in frames of 5 s while the board, the sheets and what leaks in
+board's rate: ready, then three touches. Then an hour in frames of 10 s while the board, the sheets and what leaks in
 them warm up by 10 to 40 K, with touches at the end. What the guard follows has then a thousandth of the frames that it
 has; so the sheets' own resistance grows by 0.02 % a kelvin only, not by 0.1: in truth the guard follows it in 10 s.
 """
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 FOREARM = Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350)))
 TOUCHES = ((0.13, 1.57), (0.06, 4.2), (0.20, 5.4))  # u [m], phi [rad]
 SHEETS = (0.9, 1.0, 1.1)  # resistance over nominal
-HOUR_PERIOD = 5.0  # s
+HOUR_PERIOD = 10.0  # s
 NEAR = 3e-3  # m
 _PHASES = ("rrpp", "gr..", "..rg")
 _NAMES = (
@@ -227,7 +227,7 @@ def judge(
         scenes += [touch] * 12 + [0] * 20
     ready = play(scenes, np.full(len(scenes), rng.uniform(-10.0, 10.0)), 0.005)
     if hour and ready:
-        times = np.arange(720) * HOUR_PERIOD
-        scenes = [0] * 700 + [1] * 4 + [0] * 6 + [2] * 4 + [0] * 6
+        times = np.arange(364) * HOUR_PERIOD
+        scenes = [0] * 346 + [1] * 3 + [0] * 6 + [2] * 3 + [0] * 6
         play(scenes, warming * (1.0 - np.exp(-times / 900.0)), HOUR_PERIOD)
     return Verdict(ready, max(errors), tuple(dict.fromkeys(faults)), values)

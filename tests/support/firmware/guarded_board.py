@@ -6,8 +6,8 @@ from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.testing.scenes import commissioned, forearm_scene
 
-# what the board's page says of an Uno: its bits, the resistance of its pins and switches, its rate on the line
-_SENSOR = "adc_bits = 11\nlead_ohm = [26, 3, 3, 26]"
+# what the board's page says of an Uno: its bits, the resistance of its switches, its rate on the line
+_SENSOR = "adc_bits = 11\nlead_ohm = 3"
 _BAUD = 500_000
 # patient, as the computer that emulates board and arm at once may stall; the watchdog of the board bites after 250 ms
 _LIMITS = (
