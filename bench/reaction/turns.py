@@ -21,7 +21,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.rtde_codec import decode_state
-from coneskin.robot.ur.state_reader import StateReader
+from coneskin.robot.ur.rtde_connection import StateReader
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
