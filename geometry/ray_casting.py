@@ -138,8 +138,8 @@ class _GridRayCaster:
             q = np.cross(s, self._ab[at])
             v = np.einsum("ij,ij->i", way, q) / det
             t = np.einsum("ij,ij->i", self._ac[at], q) / det
-        slack = 1e-9  # so that no ray slips between two faces
-        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (t >= 0.0) & (det != 0.0)
+            slack = 1e-9  # so that no ray slips between two faces
+            hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (t >= 0.0) & (det != 0.0)
         ray, at, t = ray[hit], at[hit], t[hit]
         order = np.argsort(-t, kind="stable")  # the nearest is written last
         ray, at, t = ray[order], at[order], t[order]

@@ -4,6 +4,7 @@ import pytest
 
 from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, SkinConnectionError
 from coneskin.robot.guard.signals.journal import GuardEvent
+from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, STILL_RETREATING, braking_time, exit_error, stop_error
 from coneskin.session.session import Session
@@ -15,6 +16,12 @@ PLACE = GuardEvent(
     "contact_located", 1.0, {"number": 1, "sensor": "cuff", "link": "forearm", "u": 0.1234, "phi": 1.5708}
 )
 ACTIVATED = GuardEvent("activated", 0.5, {})
+
+
+@pytest.fixture(autouse=True)
+def _every_package_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For some Pythons there is no ur-rtde."""
+    monkeypatch.setattr(required_packages, "find_spec", lambda name: name)
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,8 @@ def test_a_skin_is_waited_for_only_where_no_descriptor_tells_that_it_has_bytes(e
 def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
     taken = dict.fromkeys(("use.return_value", "follow.return_value", "write.return_value", "set.return_value"), True)
     stops, setpoints, slider = Mock(**taken), Mock(**taken), Mock(**taken)
-    outbox = _Outbox(GuardPorts(ends[0], None, stops=stops, setpoints=setpoints, slider=slider), lambda: 1.0)
+    starter = SimpleNamespace(use=stops.use, follow=stops.follow)  # a mock has no method before it is called
+    outbox = _Outbox(GuardPorts(ends[0], None, stops=starter, setpoints=setpoints, slider=slider), lambda: 1.0)
     speeds, program = JointVelocitySetpoint(7, (0.1,) * 6, 4.0), SetpointProgram(7, 9.0, 20.0)
     for output in (UseStopPath(StopPath.COMMAND, 5.0), UseStopPath(StopPath.SLIDER, 5.0), speeds, program):
         outbox.append(output)
