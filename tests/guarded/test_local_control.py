@@ -32,6 +32,9 @@ def test_a_switch_to_local_control_stops_the_arm_and_says_why():
         assert session.wait_for(("latched",), DEADLINE) is not None
         controller.wait_for_standstill()
         assert "local control" in next(event for event in session.events if event.name == "stopping").details["why"]
+        controller.call("remote control")  # what was connected in local control stays read-only (C210): start again
+        with pytest.raises(RobotRefused, match=r"is in local control: .* Choose Remote Control .* then start again"):
+            session.reset()
 
 
 SERVO = """  q = get_actual_joint_positions()
