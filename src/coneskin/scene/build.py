@@ -82,19 +82,17 @@ def withheld_motion(scene: Scene) -> str:
 
 
 def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
-    from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.protocol import HeartbeatDriver, load_driver
+    from coneskin.robot.driver.protocol import HeartbeatDriver
     from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.reaction.rules import RuleSet
 
     assert scene.arm is not None
-    arm = arm_model(scene.arm.model)
+    arm, driver = scene.arm.arm_model, scene.arm.driver
     rules = RuleSet(scene.default_reaction, scene.rules)
     if withheld_motion(scene):
         rules = rules.without_motion()  # a mirrored or exchanged skin would retreat into the person
     paths: tuple[StopPath, ...] = INTERNAL_PATHS if scene.arm.control == "internal" else EXTERNAL_PATHS
-    driver = load_driver(arm.driver)
     own = frozenset({StopPath.DRIVER, StopPath.WATCHDOG}).union(*driver.lost_with.values())
     paths = tuple(path for path in paths if path in own)
     if not scene.arm.slider_stop:
@@ -222,9 +220,8 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
         index, dh_frame, arm = 0, Pose(), None
         if scene.arm is not None:
             from coneskin.robot.arm.kinematics import dh_link, dh_mesh, link_index
-            from coneskin.robot.arm.models import arm_model
 
-            index, arm = link_index(link.name), arm_model(scene.arm.model)
+            index, arm = link_index(link.name), scene.arm.arm_model
             if link.frame != "dh":
                 dh_frame = dh_mesh(arm, link.name) if link.frame == "mesh" else dh_link(arm, link.name)
         frusta = [item.placed.moved(dh_frame) for item in link.sensors]

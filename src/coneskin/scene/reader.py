@@ -185,9 +185,9 @@ def _check_links(scene: s.Scene, problems: list[str]) -> None:
     Lengths and limits need a known arm.
     """
     from coneskin.robot.arm.kinematics import LINK_INDEX, link_index, link_name
-    from coneskin.robot.arm.models import arm_model, is_ur
+    from coneskin.robot.arm.models import is_ur
 
-    arm = None if scene.arm is None else arm_model(scene.arm.model)
+    arm = None if scene.arm is None else scene.arm.arm_model
     own = arm is None or is_ur(arm)
     last = len(LINK_INDEX) - 1 if arm is None else arm.joints
     listed = ", ".join(LINK_INDEX) if own else f"base, link_1 to link_{last}"

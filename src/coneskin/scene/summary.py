@@ -39,9 +39,9 @@ def missing_parts(scene: Scene) -> list[str]:
 
 def _missing_tiers(scene: Scene, arm: ArmScene) -> list[str]:
     """Return what the scene asks of its arm that the arm's driver cannot; that of UR arms can all."""
-    from coneskin.robot.arm.models import arm_model, is_ur
+    from coneskin.robot.arm.models import is_ur
 
-    model = arm_model(arm.model)
+    model = arm.arm_model
     if is_ur(model):
         return []
     from coneskin.robot.driver.protocol import (
@@ -49,7 +49,6 @@ def _missing_tiers(scene: Scene, arm: ArmScene) -> list[str]:
         ProgramDriver,
         SetpointDriver,
         SliderDriver,
-        load_driver,
         require,
     )
 
@@ -63,7 +62,7 @@ def _missing_tiers(scene: Scene, arm: ArmScene) -> list[str]:
     }
     for tier in (tier for tier, needed in wanted.items() if needed):
         try:
-            require(load_driver(model.driver), tier)
+            require(arm.driver, tier)
         except RobotRefused as exc:
             lines.append(f"{model.name}: {exc}")
     if scene.moves_away and model.currents is None:

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, encode_json, pair
 from coneskin.core.child_process import spawn
-from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.messages import LEAVE
-from coneskin.robot.driver.protocol import ProgramDriver, load_driver, require
+from coneskin.robot.driver.protocol import ProgramDriver, require
 from coneskin.skin.sources.kinds import is_simulated
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ class ChildProcesses:
         ours, theirs = pair()
         ends = [theirs]
         if scene.arm is not None and scene.arm.control == "internal":
-            module = require(load_driver(arm_model(scene.arm.model).driver), ProgramDriver).process
+            module = require(scene.arm.driver, ProgramDriver).process
             self.program = self._start_helper("driver", module, scene, ends)
             self._lifelines.append(self.program)
         elif scene.arm is not None:
@@ -96,7 +95,7 @@ class ChildProcesses:
         self.children[name] = spawn(module, helper_end, theirs)
         channel, limits = Channel(ours), scene.monitoring_limits
         settings = {
-            "driver": arm_model(scene.arm.model).driver,
+            "driver": scene.arm.arm_model.driver,
             "host": scene.arm.host,
             "monitoring": asdict(limits),
             "deceleration": scene.default_reaction.deceleration,

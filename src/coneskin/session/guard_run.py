@@ -107,8 +107,7 @@ def run_guard(
     source = stack.enter_context(open_source(scene.source.kind, scene.source.settings, start["port"]))
     ports = GuardPorts(session, source, reopen=None if is_simulated(scene.source.kind) else SourceReopening)
     if scene.arm is not None:
-        from coneskin.robot.arm.models import arm_model
-        from coneskin.robot.driver.protocol import HeartbeatDriver, SetpointDriver, SliderDriver, load_driver, require
+        from coneskin.robot.driver.protocol import HeartbeatDriver, SetpointDriver, SliderDriver, require
 
         if scene.arm.control == "internal":
             (ports.driver,) = others
@@ -116,10 +115,9 @@ def run_guard(
             ports.watchdog, ports.second = others
         ports.program = ProcessWatch(os.getppid())
         ports.helpers = {name: ProcessWatch(pid) for name, pid in start["helpers"].items()}
-        arm, needs = arm_model(scene.arm.model), core.needs
-        driver, host = load_driver(arm.driver), scene.arm.host
+        driver, host, needs = scene.arm.driver, scene.arm.host, core.needs
         stack.enter_context(_arm_lock(host))
-        driver.check_model(arm, host)
+        driver.check_model(scene.arm.arm_model, host)
         if needs.setpoints:
             ports.reader = ports.setpoints = stack.enter_context(require(driver, SetpointDriver).setpoint_writer(host))
         else:

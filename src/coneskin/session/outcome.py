@@ -34,12 +34,10 @@ _EVENT_MARGIN = 0.5  # s for the events to come, on a busy machine
 
 def braking_time(scene: Scene) -> float:
     """Return the longest time in which the arm of a scene comes to a confirmed standstill after a stop [s]."""
-    from coneskin.robot.arm.models import arm_model
-
     assert scene.arm is not None
     reactions = [scene.default_reaction, *(rule.reaction for rule in scene.rules)]
     slowest = min(reaction.deceleration for reaction in reactions)
-    fastest = max(arm_model(scene.arm.model).joint_speed)
+    fastest = max(scene.arm.arm_model.joint_speed)
     return scene.monitoring_limits.stop_budget(fastest, slowest) + _EVENT_MARGIN
 
 

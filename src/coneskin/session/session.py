@@ -20,7 +20,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, SceneError, SkinConnectionError
-from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, stopping_contact
 from coneskin.scene.commissioning_record import with_commissioning
 from coneskin.scene.reader import load_scene
@@ -309,7 +308,7 @@ class Session:
         if scene.arm is not None and program is not None:
             from .ur_rtde_names import UrRtdeArm
 
-            self._arm = UrRtdeArm(program, self.check, arm_model(scene.arm.model), scene.arm.host)
+            self._arm = UrRtdeArm(program, self.check, scene.arm.arm_model, scene.arm.host)
         self._monitor = GuardMonitor(self._log, channel, self._processes.watchdogs, self._describe_line)
         self._monitor.start()
 

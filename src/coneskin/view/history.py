@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
@@ -28,7 +28,6 @@ from coneskin.skin.wire import Frame, FrameDecoder
 
 if TYPE_CHECKING:
     from coneskin.robot.arm.model import Joints
-    from coneskin.robot.driver.values import ControllerState
     from coneskin.scene.values.scene import Scene
 
 #: kind of a phase -> its colour, which differ in brightness by 3 and more, so that no eye mistakes the last three
@@ -264,7 +263,7 @@ class History:
         self._keep = keep
         self._names = {(sensor.device_id, sensor.sensor_id): sensor.name for sensor in self.sensors}
         self._decoder = FrameDecoder()
-        self._decode = _state_decoder(scene)
+        self._decode = None if scene.arm is None else scene.arm.driver.decode_state
 
     def feed(self, block: Block) -> None:
         """Take a block; one that cannot be read, which the guard has reported, is passed over."""
@@ -354,12 +353,3 @@ class History:
         shares = [getattr(frame, name) / supply for name, supply in zip(CHANNELS, supplies, strict=True)]
         self.levels[sensor].append(time, (min(0.5 * (shares[0] + shares[1]), 1.0),))
         self.channels[sensor].append(time, tuple(min(share, 1.1) for share in shares))
-
-
-def _state_decoder(scene: Scene) -> Callable[[float, bytes], ControllerState] | None:
-    if scene.arm is None:
-        return None
-    from coneskin.robot.arm.models import arm_model
-    from coneskin.robot.driver.protocol import load_driver
-
-    return load_driver(arm_model(scene.arm.model).driver).decode_state

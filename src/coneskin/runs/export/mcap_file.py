@@ -19,7 +19,6 @@ from coneskin.core.errors import ConeSkinError, MissingExtra
 from coneskin.core.progress import Progress, silent
 from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
-from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
@@ -97,7 +96,7 @@ def _streams(run: Run, progress: Progress) -> list[Iterable[_Message]]:
         (_Message("/arm", "coneskin.ArmState", state.time, _joints(state)) for state in run.states()),
     ]
     if (scene := run.scene()).arm is not None:
-        arm, placed = arm_model(scene.arm.model), run.place_sensors()
+        arm, placed = scene.arm.arm_model, run.place_sensors()
         streams += [_drawn_arm(run, arm, placed, unix), _drawn_contacts(run, arm, placed, events, unix)]
     return streams
 

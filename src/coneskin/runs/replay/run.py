@@ -249,11 +249,8 @@ class Run:
                     yield block.time, driver.decode_speed_fraction(block.payload)
 
     def _driver(self) -> ArmDriver | None:
-        from coneskin.robot.arm.models import arm_model
-        from coneskin.robot.driver.protocol import load_driver
-
         arm = self.scene().arm
-        return None if arm is None else load_driver(arm_model(arm.model).driver)
+        return None if arm is None else arm.driver
 
     def scene(self, settings: Mapping[str, Any] | None = None) -> Scene:
         """Return the scene of the run. No file that it names is looked for or opened.

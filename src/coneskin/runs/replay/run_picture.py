@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import LINE_DASHES, write_picture
-from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import GuardEvent, stopping_contact
 from coneskin.scene.values.scene import Scene
@@ -187,7 +186,7 @@ def _draw_arm(
     from coneskin.robot.arm.workspace import skeleton
 
     assert scene.arm is not None
-    arm = arm_model(scene.arm.model)
+    arm = scene.arm.arm_model
     touched = min(states, key=lambda state: abs(state.time - zero))
     for state, colour, label in ((states[-1], "0.7", "at the end"), (touched, "#0072B2", f"at the {word}")):
         axes.plot(*zip(*skeleton(arm, state.q), strict=True), "-o", ms=3, lw=3, color=colour, label=label)

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Vector
+    from coneskin.robot.arm.model import ArmModel
+    from coneskin.robot.driver.protocol import ArmDriver
     from coneskin.robot.reaction.rules import Rule
     from coneskin.robot.reaction.types import Reaction
     from coneskin.robot.stop.limits import MonitoringLimits
@@ -167,6 +169,20 @@ class ArmScene:
     controller_heartbeat: str = "optional"
     payload: float = 0.0
     payload_xyz: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    @property
+    def arm_model(self) -> ArmModel:
+        """Geometry and limits of the arm of that name."""
+        from coneskin.robot.arm.models import arm_model
+
+        return arm_model(self.model)
+
+    @property
+    def driver(self) -> ArmDriver:
+        """Driver of its controller."""
+        from coneskin.robot.driver.protocol import load_driver
+
+        return load_driver(self.arm_model.driver)
 
 
 @dataclass(frozen=True, slots=True)

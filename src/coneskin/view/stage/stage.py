@@ -247,11 +247,10 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     if scene.arm is None:
         return Stage(title, None, (), sheets, bodies, starts)
     from coneskin.robot.arm.kinematics import MESHED_ARMS
-    from coneskin.robot.arm.models import arm_model
 
     from .solids import arm_solids
 
-    model = arm_model(scene.arm.model)
+    model = scene.arm.arm_model
     slimmest: dict[int, float] = {}
     for sheet in sheets:
         slimmest[sheet.link] = min(sheet.slimmest, slimmest.get(sheet.link, sheet.slimmest))
