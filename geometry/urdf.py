@@ -1,11 +1,14 @@
-"""Mesh of one link of a URDF, in the frame of the link. A xacro file is expanded to the URDF that it describes.
+"""Joints of a URDF, and the mesh of one of its links in the frame of the link.
 
-A xacro file is a program: it names further files, and its expressions are evaluated. Expand only what you trust.
+A xacro file is expanded to the URDF that it describes. It is a program: it names further files, and its expressions are
+evaluated. Expand only what you trust.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlparse
 from xml.etree import ElementTree
@@ -73,6 +76,48 @@ def urdf_links(
     """
     robot = _robot(Path(path), packages, arguments)
     return tuple(link.get("name", "") for link in robot.iter("link") if link.find(".//mesh") is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class UrdfJoint:
+    """A joint that turns or is fixed: x_parent = origin R(axis, angle) x_child, from lower to upper angle [rad]."""
+
+    parent: str
+    child: str
+    origin: Pose
+    axis: Vector
+    lower: float
+    upper: float
+
+
+def urdf_joints(
+    path: str | Path,
+    packages: Mapping[str, str | Path] | None = None,
+    arguments: Mapping[str, str] | None = None,
+) -> tuple[UrdfJoint, ...]:
+    """Return the joints of a URDF that turn or are fixed; arguments and errors as those of ``urdf_links``."""
+    joints = []
+    for joint in _robot(Path(path), packages, arguments).iter("joint"):
+        kind, parent, child = joint.get("type", ""), joint.find("parent"), joint.find("child")
+        if parent is None or child is None or kind not in ("revolute", "continuous", "fixed"):
+            continue
+        name = f"{path}: joint {joint.get('name')}"
+        origin, axis, limit = (joint.find(tag) for tag in ("origin", "axis", "limit"))
+        xyz, rpy = (
+            _numbers("0 0 0" if origin is None else origin.get(key, "0 0 0"), f"{name}: {key}")
+            for key in ("xyz", "rpy")
+        )
+        way = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"{name}: axis")
+        lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
+        if kind == "revolute" and limit is not None:
+            lower, upper, _ = _numbers(f"{limit.get('lower', 0)} {limit.get('upper', 0)} 0", f"{name}: limit")
+        if upper - lower > math.tau:
+            lower, upper = -math.pi, math.pi
+        length = math.hypot(*way) or 1.0
+        unit = way[0] / length, way[1] / length, way[2] / length
+        links = parent.get("link", ""), child.get("link", "")
+        joints.append(UrdfJoint(*links, Pose.from_xyz_rpy(xyz, rpy), unit, lower, upper))
+    return tuple(joints)
 
 
 def load_urdf_link(

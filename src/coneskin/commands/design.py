@@ -3,6 +3,7 @@
 examples:
   coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
   coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
+  coneskin design arm.urdf --wires 24 -o skins         all links of a robot: the sheets that 24 wires buy
   coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
@@ -57,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
     add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create")
     add("--force", action="store_true", help="replace an earlier design in that folder")
+    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): the sheets that N wires buy")
     add("--json", action="store_true", help="print the design as JSON")
     add("--no-pictures", action="store_true", help="write the report without pictures")
     add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")
@@ -115,6 +117,17 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     search = {**settings.search, **given_keys(args, _SHORT_KEYS)}
     packages = _pairs(args.package, "--package takes NAME=DIR, as in --package ur_description=src/ur_description")
     arguments = _pairs(args.xacro_arg, "--xacro-arg takes NAME=VALUE, as in --xacro-arg ur_type=ur5e")
+    common: dict[str, Any] = {
+        "options": settings.options,
+        "packages": packages,
+        "arguments": arguments,
+        "files": settings.files,
+        "pictures": not args.no_pictures,
+        "replace": args.force,
+        "progress": say,
+    }
+    if args.wires is not None:
+        return _design_robot(args, common | search)
     link: str | Sequence[PlacedFrustum]
     if args.link is None:
         link = _links_from_dimensions(args, search)
@@ -130,19 +143,7 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         if args.seam is not None:
             search["seam_direction"] = _seam(args.seam, search)
     try:
-        design = design_link(
-            link,
-            args.output,
-            options=settings.options,
-            unit=args.unit,
-            packages=packages,
-            arguments=arguments,
-            files=settings.files,
-            pictures=not args.no_pictures,
-            replace=args.force,
-            progress=say,
-            **search,
-        )
+        design = design_link(link, args.output, unit=args.unit, **common, **search)
     except NothingFits as nothing:
         return _report_nothing(nothing)
     if args.json:
@@ -150,6 +151,21 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
     else:
         _print(design)
         _print_next(design, args.output)
+    return 0
+
+
+def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
+    from coneskin.design.robot_design import design_robot
+
+    if not (args.link or "").lower().endswith((".urdf", ".xacro")):
+        raise GeometryError("--wires is for a whole robot: name its FILE.urdf, without #LINK")
+    design = design_robot(args.link, args.output, args.wires, **common)
+    for count, one in enumerate(design.offered, 1):
+        bought = "" if count <= design.bought else ", not bought"
+        print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link}, {1e4 * one.area:.1f} cm2{bought}")
+    print("\n".join(design.reasons))
+    folder = shlex.quote(str(args.output))
+    print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}; on another arm than a UR: --skin-only")
     return 0
 
 

@@ -24,6 +24,8 @@ from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from .terminal import print_hint
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from coneskin.design.first_scene import ArmAddress, DesignFolder
     from coneskin.skin.firmware.board_circuit import BoardCircuit
 
@@ -52,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the scene, read it again, and name the next command."""
     from coneskin.core.files import write_whole
-    from coneskin.design.first_scene import first_scene, read_design
+    from coneskin.design.first_scene import first_scene, read_designs
     from coneskin.scene.reader import parse_scene
     from coneskin.scene.suspicions import suspicions
 
@@ -60,9 +62,9 @@ def run(args: argparse.Namespace) -> int:
         raise GeometryError(f"{args.output} exists already: name another file with -o, or replace it with --force")
     if not args.output.parent.is_dir():
         raise GeometryError(f"there is no folder {args.output.parent} for {args.output.name}: make it, or name another")
-    design = read_design(args.design)
-    address, ports, boards = _arm(args), _ports(args), _boards(args, design)
-    text = first_scene(design, args.output.absolute(), address, ports, args.link, boards)
+    designs = read_designs(args.design)
+    address, ports, boards = _arm(args), _ports(args), _boards(args, designs)
+    text = first_scene(designs, args.output.absolute(), address, ports, args.link, boards)
     try:
         scene = parse_scene(text, args.output.name, args.output.absolute().parent)  # refused here, not by the guard
     except SceneError as exc:
@@ -71,7 +73,8 @@ def run(args: argparse.Namespace) -> int:
     write_whole(args.output, text)
     arm = f"a {scene.arm_label}" if scene.arm else "no arm"
     count = len(scene.sensors)
-    print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {scene.links[0].name}, {arm}")
+    names = ", ".join(link.name for link in scene.links)
+    print(f"{args.output}: {count} sensor{'s' if count != 1 else ''} on the {names}, {arm}")
     for finding in suspicions(scene):
         print(f"warning: {finding.line}", file=sys.stderr)
     if address and not args.arm:
@@ -97,16 +100,17 @@ def _arm(args: argparse.Namespace) -> ArmAddress | None:
     return ArmAddress(model, host)
 
 
-def _boards(args: argparse.Namespace, design: DesignFolder) -> list[BoardCircuit]:
+def _boards(args: argparse.Namespace, designs: Sequence[DesignFolder]) -> list[BoardCircuit]:
     """Return the board of each sensor; none where no board was named."""
     if args.board is None:
         return []
     from coneskin.skin.firmware.board_circuit import board_circuit
 
-    count = len(design.sensors)
+    sensors = [sensor for design in designs for sensor in design.sensors]
+    count = len(sensors)
     if args.port and len(args.port) != count:
         raise GeometryError(f"a board reads one sensor, and the design has {count}: give --port {count} times")
-    return [board_circuit(args.board, sensor, args.converter) for sensor in design.sensors]
+    return [board_circuit(args.board, sensor, args.converter) for sensor in sensors]
 
 
 def _ports(args: argparse.Namespace) -> list[str]:

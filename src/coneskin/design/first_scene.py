@@ -70,6 +70,7 @@ class DesignFolder:
         frame: "mesh" or "urdf", to which the poses of the sensors refer; None where the design was made from dimensions
             and has no place on a link.
         thickness: of a sheet with all its layers [m]; None where the design does not say it.
+        name: of the link, as the design has it.
     """
 
     sensor_files: tuple[Path, ...]
@@ -77,10 +78,24 @@ class DesignFolder:
     link: str | None
     frame: str | None
     thickness: float | None = None
+    name: str = ""
+
+
+def read_designs(folder: Path) -> tuple[DesignFolder, ...]:
+    """Read what `coneskin design` has written: the design of a link, or of all links of a robot.
+
+    Raises:
+        GeometryError: the folder is no design.
+    """
+    try:
+        names = [str(name) for name in read_json(read_file(folder / DESIGN_FILE, _MAX_BYTES)).get("links", ())]
+    except (OSError, ValueError, TypeError, AttributeError):
+        names = []
+    return tuple(read_design(folder / name) for name in names) or (read_design(folder),)
 
 
 def read_design(folder: Path) -> DesignFolder:
-    """Read what `coneskin design` has written.
+    """Read the design of a link.
 
     Raises:
         GeometryError: the folder is no design.
@@ -114,6 +129,7 @@ def read_design(folder: Path) -> DesignFolder:
         arm_link(name or PurePath(path).stem),
         kind,
         None if thickness is None else 1e-3 * float(thickness),
+        name or PurePath(path).stem,
     )
 
 
@@ -127,17 +143,17 @@ def arm_link(name: str) -> str | None:
 
 
 def first_scene(
-    design: DesignFolder,
+    designs: Sequence[DesignFolder],
     target: Path,
     arm: ArmAddress | None,
     ports: Sequence[str],
     link: str | None = None,
     boards: Sequence[BoardCircuit] = (),
 ) -> str:
-    """Return the text of a scene for a design: the arm stops when it is touched.
+    """Return the text of a scene for the designs of one link or more: the arm stops when it is touched.
 
     Args:
-        design: as ``read_design`` returns it.
+        designs: as ``read_designs`` returns them.
         target: the scene's file; the paths in it are relative to its folder.
         arm: that carries the sensors; None to watch the skin alone.
         ports: of the skin; empty for a virtual skin, which is touched while the arm moves.
@@ -148,32 +164,39 @@ def first_scene(
         GeometryError: the link, or the place of the sensors on it, is not known.
         KinematicsError: there is no such arm or link.
     """
-    name = link or design.link
-    if arm is not None and name is None:
+    names = [link or design.link for design in designs]
+    if arm is not None and None in names:
         raise GeometryError(
             f"which link of the arm was it designed for? Add --link, one of {', '.join(LINK_INDEX)}, or --skin-only "
             "where the arm is not one of UR's"
         )
-    if arm is not None and name is not None:
-        name = next(known for known, number in LINK_INDEX.items() if number == link_index(name))
+    if arm is not None:
+        indices = [link_index(name or "") for name in names]
+        names = [next(known for known, number in LINK_INDEX.items() if number == index) for index in indices]
     lines = [_FILE_HEAD]
     if arm is not None:
         lines.append(f'[arm]\nmodel = "{arm_model(arm.model).name}"\nhost = {json.dumps(arm.host)}\n')
-    lines.append(f'[[link]]\nname = {json.dumps(name or "link")}\nframe = "{design.frame or "mesh"}"\n')
-    for number, (path, sensor) in enumerate(zip(design.sensor_files, design.sensors, strict=True)):
-        file = os.path.relpath(path, target.parent).replace(os.sep, "/")
-        lines.append(
-            f"[[link.sensor]]\nfile = {json.dumps(file)}     # its dimensions, pose on the link and electronics"
-        )
-        if design.frame is None and arm is not None:
-            lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
-        if boards:
-            lines.append(f"# as the board has it ({boards[number].facts.title}):")
-            lines += [f"{key} = {value_text(value)}" for key, value in boards[number].keys.items()]
-        lines.append("")
-    if arm is not None and design.thickness is not None:
-        lines.append(_padding(design.thickness))
-    lines += _sources(ports, boards) if ports else [_virtual(design)]
+    number = 0
+    for design, name in zip(designs, names, strict=True):
+        title = name or (design.name if len(designs) > 1 else "link")
+        lines.append(f'[[link]]\nname = {json.dumps(title)}\nframe = "{design.frame or "mesh"}"\n')
+        for path, sensor in zip(design.sensor_files, design.sensors, strict=True):
+            file = os.path.relpath(path, target.parent).replace(os.sep, "/")
+            lines.append(
+                f"[[link.sensor]]\nfile = {json.dumps(file)}     # its dimensions, pose on the link and electronics"
+            )
+            if len(designs) > 1:
+                lines.append(f"id = {number}\nname = {json.dumps(f'{title} {sensor.name}')}")
+            if design.frame is None and arm is not None:
+                lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
+            if boards:
+                lines.append(f"# as the board has it ({boards[number].facts.title}):")
+                lines += [f"{key} = {value_text(value)}" for key, value in boards[number].keys.items()]
+            lines.append("")
+            number += 1
+    if arm is not None and designs[0].thickness is not None:
+        lines.append(_padding(designs[0].thickness))
+    lines += _sources(ports, boards) if ports else [_virtual(designs[0])]
     if arm is not None:
         lines.append('[reaction]\nkind = "stop"               # retreat and comply need `coneskin commission`\n')
     lines.append('[recording]\nfolder = "runs"\n')

@@ -134,3 +134,26 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
     seam = "seam" if design.has_seam else "edge"
     for at in (0.0, 1.0):
         axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")
+
+
+def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], bought: int) -> None:
+    """Draw what active area [m2] each number of wires buys on a robot.
+
+    Args:
+        file: to write.
+        steps: wires and area.
+        names: of the sheet that each brings.
+        bought: how many of them are bought.
+    """
+    from matplotlib.figure import Figure
+
+    points = [(0.0, 0.0), *((float(wires), 1e4 * area) for wires, area in steps)]
+    with picture_style():
+        figure = Figure(figsize=(8, 4.5), layout="constrained")
+        axes = figure.add_subplot()
+        axes.step(*zip(*points, strict=True), where="post", color="#2a7fb8")
+        axes.plot(*zip(*points[1 : bought + 1], strict=True), "o", color="#2a7fb8")
+        for at, name in zip(points[1:], names, strict=True):
+            axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
+        axes.set(xlabel="wires", ylabel="active area [cm2]")
+        figure.savefig(file, dpi=130)

@@ -1,0 +1,99 @@
+"""Skin of a robot: what the wires buy, what moves beside a sheet, and one scene with all sensors."""
+
+import itertools
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from coneskin.cli import main
+from coneskin.core.errors import GeometryError
+from coneskin.design.robot_design import design_robot
+from coneskin.design.sheets.cable_way import SheetBody
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
+from coneskin.geometry.urdf import urdf_joints
+from coneskin.scene.reader import parse_scene
+
+
+def write_robot(folder: Path, stop_z: float) -> Path:
+    """Two tubes of 50 and 40 mm; on the second stands an arm that a turn leads around the first, near its far end."""
+    first = trimesh.creation.cylinder(0.05, 0.3, sections=96)
+    first.export(folder / "first.stl")
+    tube = trimesh.creation.cylinder(0.04, 0.2, sections=96)
+    tube.apply_translation((0.0, 0.0, 0.3))
+    stop = trimesh.creation.box((0.02, 0.02, 0.02))
+    stop.apply_translation((0.062, 0.0, stop_z))
+    trimesh.util.concatenate([tube, stop]).export(folder / "second.stl")
+    links = "".join(
+        f'<link name="{name}"><visual><geometry><mesh filename="{file}"/></geometry></visual></link>'
+        for name, file in (("upper_arm_link", "first.stl"), ("forearm_link", "second.stl"))
+    )
+    joint = (
+        '<joint name="elbow" type="revolute"><parent link="upper_arm_link"/><child link="forearm_link"/>'
+        '<origin xyz="0 0 0" rpy="0 0 0"/><axis xyz="0 0 2"/><limit lower="-9" upper="9"/></joint>'
+    )
+    path = folder / "arm.urdf"
+    path.write_text(f'<robot name="r">{links}{joint}</robot>')
+    return path
+
+
+def test_a_joint_has_its_place_its_unit_axis_and_no_more_than_a_turn(tmp_path: Path) -> None:
+    (joint,) = urdf_joints(write_robot(tmp_path, 0.1))
+    assert (joint.parent, joint.child, joint.axis) == ("upper_arm_link", "forearm_link", (0.0, 0.0, 1.0))
+    assert joint.origin == Pose()
+    assert (joint.lower, joint.upper) == (-math.pi, math.pi)
+
+
+@pytest.mark.long
+def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tmp_path: Path) -> None:
+    robot, out = write_robot(tmp_path, 0.1), tmp_path / "skin"
+    design = design_robot(robot, out, 4, pictures=False, max_sheets=1)
+    assert [one.link for one in design.offered] == ["upper_arm_link", "forearm_link"]
+    assert [one.wires for one in design.offered] == [4, 8]
+    assert design.offered[1].total == pytest.approx(sum(one.area for one in design.offered))
+    assert (design.bought, sorted(path.name for path in out.iterdir() if path.is_dir())) == (1, ["upper_arm_link"])
+    rows = re.findall(r"^\| (\d+) \| (\w+) \|.*\| (yes|no) \|$", (out / "report.md").read_text(), re.MULTILINE)
+    assert rows == [("4", "upper_arm_link", "yes"), ("8", "forearm_link", "no")]
+    (sheet,) = json.loads((out / "upper_arm_link" / "design.json").read_text())["sheets"]
+    cone = sheet["link_cone"]
+    side = Frustum(1e-3 * cone["radius1_mm"], 1e-3 * cone["radius2_mm"], 1e-3 * cone["height_mm"])
+    body = SheetBody(
+        PlacedFrustum(
+            side, Pose.from_xyz_rpy([1e-3 * x for x in cone["xyz_mm"]], np.radians(cone["rpy_deg"]).tolist())
+        ),
+        1e-3 * sheet["thickness_mm"],
+    )
+    corners = np.array(list(itertools.product((0.052, 0.072), (-0.01, 0.01), (0.09, 0.11))))
+    for turn in np.radians(np.arange(0.0, 360.0, 3.0)):
+        turned = Pose.from_rotation_vector((0.0, 0.0, float(turn))).apply_all(corners)
+        assert not body.near(turned, 2e-3).any(), "the sheet ends before the way of the stop"
+    assert any("end before what moves" in reason for reason in design.reasons)
+    with pytest.raises(GeometryError, match="2 sheets are possible, and 3 wires buy none: a sheet has 4"):
+        design_robot(robot, tmp_path / "none", 3, pictures=False, max_sheets=1)
+    assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.long
+def test_one_scene_takes_the_sensors_of_all_links(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    robot = write_robot(tmp_path, 0.42)
+    assert main(["design", f"{robot}#forearm_link", "--wires", "8", "-o", "skin"]) == 1
+    assert "--wires is for a whole robot" in capsys.readouterr().err
+    assert main(["design", str(robot), "--wires", "8", "--max-sheets", "1", "-o", "skin"]) == 0
+    said = capsys.readouterr().out
+    assert "4 wires" in said
+    assert "8 wires" in said
+    assert (tmp_path / "skin" / "curve.png").is_file()
+    assert main(["init", "skin", "--simulated", "--arm", "UR5e"]) == 0
+    assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
+    scene = parse_scene((tmp_path / "scene.toml").read_text(), "scene.toml", tmp_path)
+    assert [[item.sensor.sensor_id for item in link.sensors] for link in scene.links] == [[0], [1]]
+    assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0
