@@ -34,8 +34,8 @@ def expected_counts(sensor: Sensor) -> tuple[int, ...]:
     """Return what an untouched sensor should read, in the order of ``MEASURED`` [counts]."""
     parts = sensor.electronics
     supply = parts.count_volts(parts.supply_volts)
-    radial, angular = parts.count_amperes(sensor.radial_amperes), parts.count_amperes(sensor.angular_amperes)
-    return (0, 0, 0, 0, 0, radial, 0, 0, angular, supply, supply, supply)
+    zero, radial, angular = map(parts.count_amperes, (0.0, sensor.radial_amperes, sensor.angular_amperes))
+    return (0, 0, zero, 0, 0, radial, 0, 0, angular, supply, supply, supply)
 
 
 def find_big_endian(frames: Sequence[Frame]) -> Finding | None:

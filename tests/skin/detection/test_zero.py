@@ -10,6 +10,7 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK, UntouchedZero
+from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -87,6 +88,14 @@ def test_it_is_found_at_once_and_followed_slowly_once_somebody_relies_on_it():
         for frame in frames(23):
             zero.feed(frame, 0.005, free=False)
     assert zero.counts == 22
+
+
+def test_the_monitor_expects_the_bias_where_no_current_flows():
+    expected = dict(zip(MEASURED, expected_counts(BIASED), strict=True))
+    plain = dict(zip(MEASURED, expected_counts(PLAIN), strict=True))
+    assert expected["touch_current"] == 51
+    assert plain["touch_current"] == 0
+    assert expected["radial_current"] - plain["radial_current"] == pytest.approx(51, abs=1)
 
 
 def test_full_scale_stays_full_scale():
