@@ -77,15 +77,15 @@ class TouchPlace:
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
         self._softer = self._harder = 0.0
-        self._begun = self._located = False
+        self._located = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
-        self._first_x = self._first_y = 0.0
+        self._first: tuple[float, float] | None = None  # where its evidence began
         self._restart()
 
     def end(self) -> None:
         """Forget the touch: it is over."""
-        self._begun, self._located, self._newest = False, False, None
+        self._located, self._first, self._newest = False, None, None
         self._seam.end()
         self._restart()
 
@@ -250,11 +250,12 @@ class TouchPlace:
             return WEAK if reading.level < self._level else CONTRADICTS
         x, y, before = matrix.x, matrix.y, self._newest
         along, around = self._scale  # distances are never too small
-        off_x, off_y = along * (x - self._first_x), around * (y - self._first_y)
+        first_x, first_y = self._first or (x, y)
+        off_x, off_y = along * (x - first_x), around * (y - first_y)
         single = self._single
-        if not self._begun or off_x * off_x + off_y * off_y > self._slide:
+        if self._first is None or off_x * off_x + off_y * off_y > self._slide:
             single.begin()
-            self._begun, self._first_x, self._first_y = True, x, y
+            self._first = x, y
         self._newest = x, y
         disc = None
         if estimate is not None:

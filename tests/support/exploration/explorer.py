@@ -78,7 +78,6 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
     back: dict[Hashable, list[Hashable]] = {first: []}
     wanted = {first} if world.wanted else set()
     broken: dict[str, tuple[tuple[str, ...], str]] = {}
-    unsound: set[Hashable] = set()  # reached by a broken invariant: nothing after it counts
     queue: deque[tuple[Hashable, Any]] = deque([(first, world.save())])
     fresh: Counter[str] = Counter()
     steps = depth = 0
@@ -113,7 +112,7 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
                 if before not in reached:
                     reached.add(before)
                     todo.append(before)
-        stuck = [key for key in ways if key not in reached and key not in unsound]
+        stuck = [key for key in ways if key not in reached]
         if stuck:
             shortest = min(stuck, key=lambda key: ways[key][2])
             broken[progress] = (_way(ways, shortest), f"{progress}: {len(stuck)} states lead no way back")
