@@ -200,48 +200,23 @@ def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class TablePlane:
-    """Horizontal plane in the base frame that the arm does not go below.
-
-    The arm is taken as the line along the axes of its tubes (``skeleton``), from the shoulder on, because the base
-    stands on the table. The thickness of the tubes and the length of the tool belong in the height.
-
-    Attributes:
-        height: height of the plane above the base frame's origin [m].
-    """
-
-    height: float
-
-    def below(self, corners: Sequence[Vector]) -> bool:
-        """Return whether a corner of a skeleton is below the plane."""
-        return any(corner[2] < self.height for corner in corners[1:])
-
-    def entered(self, here: Sequence[Vector], there: Sequence[Vector]) -> bool:
-        """Return whether a corner would be below the plane, and lower than now.
-
-        Args:
-            here: the arm's skeleton now [m].
-            there: its skeleton after the motion [m].
-        """
-        return any(
-            after[2] < self.height and after[2] < before[2] for before, after in zip(here[1:], there[1:], strict=True)
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Workspace:
     """Room that an arm has.
 
+    The arm is taken as the line along the axes of its tubes (``skeleton``); it may not go below a table from the
+    shoulder on, because the base stands on it. The thickness of the tubes and the length of the tool belong in its
+    height.
+
     Attributes:
         model: the arm.
-        table: plane below which it must not go, or None.
+        table: height in the base frame of a horizontal plane below which it must not go [m], or None.
 
     Raises:
         KinematicsError: it is not known where the arm's links are beside the lines of its DH table.
     """
 
     model: ArmModel
-    table: TablePlane | None = None
+    table: float | None = None
 
     def __post_init__(self) -> None:
         dh_mesh(self.model, "forearm")
@@ -256,18 +231,19 @@ class Workspace:
             qd: wanted joint speeds [rad/s].
             braking: deceleration of the leading joint [rad/s^2].
         """
-        leading = max(map(abs, qd))
+        leading, table = max(map(abs, qd)), self.table
         if not leading:
             return ""
         ahead = REACTION_TIME + leading / (2.0 * braking)
         there = skeleton(self.model, [angle + ahead * speed for angle, speed in zip(q, qd, strict=True)])
-        low = self.table is not None and self.table.below(there)
+        low = table is not None and any(corner[2] < table for corner in there[1:])
         near = _close_pairs(self.model, there)
         if not (low or near):  # nearly always; then the present skeleton is not needed
             return ""
         here = skeleton(self.model, q)
-        if self.table is not None and low and self.table.entered(here, there):
-            return f"the table at {1e3 * self.table.height:g} mm is in the way"
+        corners = zip(here[1:], there[1:], strict=True)
+        if table is not None and low and any(b[2] < table and b[2] < a[2] for a, b in corners):
+            return f"the table at {1e3 * table:g} mm is in the way"
         for a, b, distance in near:
             if distance < _segment_distance(*here[a : a + 2], *here[b : b + 2]):
                 first, second = _PART_NAMES[a], _PART_NAMES[b]

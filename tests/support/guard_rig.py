@@ -11,7 +11,6 @@ from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh, link_pose
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import UR_CURRENTS, arm_model
-from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import Release
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
@@ -71,7 +70,7 @@ class GuardRig:
         speed: float = 0.0,
         rules: tuple[Rule, ...] = (),
         external: bool = False,
-        table: TablePlane | None = None,
+        table: float | None = None,
         follows: bool = False,
         bits: int = 16,
         speed_limit: SpeedLimit | None = None,
@@ -208,7 +207,7 @@ def make_core(
     reaction: Reaction,
     rules: tuple[Rule, ...] = (),
     external: bool = False,
-    table: TablePlane | None = None,
+    table: float | None = None,
     driver: ArmDriver = UR_DRIVER,
     speed_limit: SpeedLimit | None = None,
     limits: MonitoringLimits | None = None,

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from coneskin.robot.arm.model import ArmModel, Joints
-from coneskin.robot.arm.workspace import TablePlane, Workspace
+from coneskin.robot.arm.workspace import Workspace
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram
 from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
@@ -98,7 +98,7 @@ class ReactionPlanner:
     Args:
         model: the arm.
         watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
-        table: what the arm must not go below while it moves.
+        table: height in the base frame that the arm must not go below while it moves [m].
         bare: sides of the arm that no skin covers. None where there are none.
 
     Attributes:
@@ -109,7 +109,7 @@ class ReactionPlanner:
         self,
         model: ArmModel,
         watchdog_hz: float | None = None,
-        table: TablePlane | None = None,
+        table: float | None = None,
         bare: BareSides | None = None,
     ) -> None:
         self.torque = OutsideTorque(model)

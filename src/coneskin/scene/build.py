@@ -148,14 +148,14 @@ def _angle(a: Vector, b: Vector) -> float:
 
 
 def _planner(scene: Scene, arm: ArmModel, placed: Sequence[SensorOnArm]) -> ReactionPlanner:
-    from coneskin.robot.arm.workspace import TablePlane
     from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
     from coneskin.robot.reaction.bare_side import BareSides
 
     assert scene.arm is not None
-    table = None if scene.arm.table_z is None else TablePlane(scene.arm.table_z)
     watchdog = scene.arm.watchdog_hz if scene.arm.control == "external" else None
-    return ReactionPlanner(arm, watchdog, table, BareSides(arm, [(item.link, item.frustum) for item in placed]))
+    return ReactionPlanner(
+        arm, watchdog, scene.arm.table_z, BareSides(arm, [(item.link, item.frustum) for item in placed])
+    )
 
 
 @dataclass(frozen=True, slots=True)

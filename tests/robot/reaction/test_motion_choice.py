@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
-from coneskin.robot.arm.workspace import TablePlane, Workspace, skeleton
+from coneskin.robot.arm.workspace import Workspace, skeleton
 from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
@@ -199,7 +199,7 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
 @settings(max_examples=20)
 def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
     contact = ContactOnLink(3, (0.2, 0.0, 0.0), unit(normal))
-    space = Workspace(ARM, TablePlane(height))
+    space = Workspace(ARM, height)
     plan = plan_retreat(ARM, ArmState(0.0, q), [contact], Reaction(kind="retreat", distance=0.2), space)
     assume(not isinstance(plan, Done))
     states, over = follow(lambda state: _PlannedMotion(plan).update(state, ()), q)
@@ -216,7 +216,7 @@ def test_no_point_of_the_arm_goes_below_the_table(q, normal, height):
 
 def test_the_table_is_named():
     down = ContactOnLink(3, (0.2, 0.0, 0.0), unit(link_pose(ARM, Q, 3).inverse().rotate((0.0, 0.0, 1.0))))
-    plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(kind="retreat"), Workspace(ARM, TablePlane(1.5)))
+    plan = plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(kind="retreat"), Workspace(ARM, 1.5))
     assert plan == Done("the table at 1500 mm is in the way")
-    low = Workspace(ARM, TablePlane(-1.0))
+    low = Workspace(ARM, -1.0)
     assert not isinstance(plan_retreat(ARM, ArmState(0.0, Q), [down], Reaction(kind="retreat"), low), Done)

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from coneskin.robot.arm.workspace import TablePlane
 from coneskin.robot.driver.messages import SetJointVelocity
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, StopPath
 from coneskin.robot.guard.phase import Phase
@@ -185,7 +184,7 @@ def test_from_touches_on_opposite_sides_it_only_stops():
 
 
 def test_a_table_in_the_way_is_named_and_the_arm_stays():
-    table = TablePlane(2.0)  # higher than the arm
+    table = 2.0  # higher than the arm
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="retreat", distance=0.08), table=table, speed=1.0).run(1.5)
     assert "the table at 2000 mm is in the way" in rig.event("latched").details["why"]
 
