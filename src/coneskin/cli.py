@@ -149,7 +149,9 @@ def _run(arguments: Sequence[str] | None) -> int:
     args = parser.parse_args(words)
     assert run is not None  # argparse has ended the program otherwise
     try:
-        return int(run(args))
+        code = int(run(args))
+        sys.stdout.flush()  # not at the end of Python, which tells of a reader that is gone
+        return code
     except ConeSkinError as exc:
         print(printable(f"coneskin {args.command}: {exc}"), file=sys.stderr)
         return 1

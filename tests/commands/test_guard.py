@@ -56,7 +56,8 @@ def test_a_scene_that_the_guard_would_refuse_is_said_to_be_one(tmp_path, capsys,
     assert len(json.loads(out)["cannot_be_guarded_yet"]) == len(missing)
 
 
-def test_an_arm_that_will_only_stop_is_the_last_thing_that_is_said(tmp_path, capsys):
+def test_an_arm_that_will_only_stop_is_the_last_thing_that_is_said(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("coneskin.scene.required_packages.find_spec", lambda name: name)  # not of every Python
     code, out, err = check(tmp_path, SERIAL_RETREAT, capsys)
     assert (code, err) == (0, "")
     assert out.splitlines()[-1] == (
