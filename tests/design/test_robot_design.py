@@ -96,4 +96,6 @@ def test_one_scene_takes_the_sensors_of_all_links(
     assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
     scene = parse_scene((tmp_path / "scene.toml").read_text(), "scene.toml", tmp_path)
     assert [[item.sensor.sensor_id for item in link.sensors] for link in scene.links] == [[0], [1]]
+    for name, number in (("upper_arm_link", 0), ("forearm_link", 1)):
+        assert f"| sensor number | {number} |" in (tmp_path / "skin" / name / "report.md").read_text()
     assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0

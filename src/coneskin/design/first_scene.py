@@ -186,7 +186,7 @@ def first_scene(
                 f"[[link.sensor]]\nfile = {json.dumps(file)}     # its dimensions, pose on the link and electronics"
             )
             if len(designs) > 1:
-                lines.append(f"id = {number}\nname = {json.dumps(f'{title} {sensor.name}')}")
+                lines.append(f"name = {json.dumps(f'{title} {sensor.name}')}")
             if design.frame is None and arm is not None:
                 lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
             if boards:

@@ -158,6 +158,7 @@ def _write_sheets(
     progress: Callable[[str], None],
     beds: Iterable[MaterialBed],
     others: Iterable[str],
+    first_sensor: int,
 ) -> None:
     """Write drawings, sensor files, the table of materials and design.json.
 
@@ -174,7 +175,7 @@ def _write_sheets(
     for index, design in enumerate(designs):
         progress(f"{design.name}: writing drawings")
         place = sheet_folder(designs, index)
-        write(place / "sensor.toml", sensor_toml(design, index, str(data["frame"])))
+        write(place / "sensor.toml", sensor_toml(design, first_sensor + index, str(data["frame"])))
         for cut in design.cuts:
             _write_drawing(write, place / "cut" / cut.slug, (cut,), f"{design.name}, {cut.name}", options)
         piece = make_test_piece("every material")
@@ -222,6 +223,7 @@ def write_design(
     pictures: bool = True,
     replace: bool = False,
     progress: Callable[[str], None] = lambda _: None,
+    first_sensor: int = 0,
 ) -> dict[str, Any]:
     """Write everything that a person needs to build the sheets, and the guard to use them.
 
@@ -238,6 +240,7 @@ def write_design(
         pictures: True to draw pictures too, which needs the extra ``pictures``.
         replace: True to allow an earlier design in the folder; files that are not of that design stay.
         progress: called with the name of each step.
+        first_sensor: number of the first sensor in the wire format.
 
     Returns:
         the content of design.json; "files" lists all files of the design, as paths in the folder.
@@ -253,7 +256,8 @@ def write_design(
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
     faces = () if mesh is None else find_datum_faces(mesh)
     figures = [
-        measure_build(design, index, frame, mesh, sheets[:index], faces, sheets) for index, design in enumerate(sheets)
+        measure_build(design, first_sensor + index, frame, mesh, sheets[:index], faces, sheets)
+        for index, design in enumerate(sheets)
     ]
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
     data["sheets"] = [
@@ -278,7 +282,8 @@ def write_design(
             tolerance, areas = (0.0, ()) if fit is None else (fit.tolerance, fit.bare_areas)
             weights = None if fit is None else fit.touch_weights
             drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas, weights)
-        text = report_text(sheets, figures, title, (*notes, *larger, f"Frame of all poses: {frame}"), fit, drawn, beds)
+        notes = (*notes, *larger, f"Frame of all poses: {frame}")
+        text = report_text(sheets, figures, title, notes, fit, drawn, beds, first_sensor)
         (draft / "report.md").write_text(text, encoding="utf-8")
         written = ["report.md", *(file for _, file in drawn)]
         for index, (design, item) in enumerate(zip(sheets, figures, strict=True)):
@@ -288,7 +293,7 @@ def write_design(
             if options.step:
                 progress(f"{design.name}: writing the wrapped layers")
                 written.append(_write_wrapped(draft, sheet_folder(sheets, index), design))
-        _write_sheets(draft, sheets, data, options, progress, beds, written)
+        _write_sheets(draft, sheets, data, options, progress, beds, written, first_sensor)
         progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
     return data
 

@@ -34,6 +34,7 @@ def report_text(
     fit: LinkFit | None = None,
     pictures: Sequence[tuple[str, str]] = (),
     beds: Sequence[MaterialBed] = (),
+    first_sensor: int = 0,
 ) -> str:
     """Return the report as Markdown.
 
@@ -45,6 +46,7 @@ def report_text(
         fit: fit of the sheets to a mesh; None for a link given by its dimensions.
         pictures: caption and file of each picture.
         beds: parts of each material, nested.
+        first_sensor: number of the first sensor in the wire format.
     """
     lines = [f"# Sensor for {link}", ""]
     lines += [f"* {note}" for note in notes]
@@ -60,7 +62,7 @@ def report_text(
     lines += common_lines(designs, figures)
     for index, (design, item) in enumerate(zip(designs, figures, strict=True)):
         folder, drawn = sheet_folder(designs, index).as_posix(), shown[f"{design.name.replace(' ', '-')}-"]
-        lines += ["", *sheet_lines(design, item, folder, index, drawn)]
+        lines += ["", *sheet_lines(design, item, folder, first_sensor + index, drawn)]
     for index, design in enumerate(designs):
         lines += ["", *_sheet_section(design, sheet_folder(designs, index).as_posix())]
     return "\n".join(lines) + "\n"

@@ -130,7 +130,7 @@ def design_robot(
         )
     with _new_folder(Path(folder), replace) as draft:
         result = RobotDesign(tuple(offered), bought, tuple(reasons))
-        links = []
+        links, sensors = [], 0
         for name, (design, sheets) in found.items():
             wanted = {one.number for one in offered[:bought] if one.link == name}
             if not wanted:
@@ -151,7 +151,9 @@ def design_robot(
                 options=files,
                 pictures=pictures,
                 progress=progress,
+                first_sensor=sensors,
             )
+            sensors += len(chosen)
             links.append(name)
         _write_robot(draft, result, links, str(robot), pictures)
     return result
