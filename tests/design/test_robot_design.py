@@ -12,6 +12,7 @@ import trimesh
 
 from coneskin.cli import main
 from coneskin.core.errors import GeometryError
+from coneskin.design.first_scene import _virtual, read_designs
 from coneskin.design.robot_design import design_robot
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.geometry.frustum import Frustum
@@ -98,4 +99,6 @@ def test_one_scene_takes_the_sensors_of_all_links(
     assert [[item.sensor.sensor_id for item in link.sensors] for link in scene.links] == [[0], [1]]
     for name, number in (("upper_arm_link", 0), ("forearm_link", 1)):
         assert f"| sensor number | {number} |" in (tmp_path / "skin" / name / "report.md").read_text()
+    assert "rate_hz" not in (tmp_path / "scene.toml").read_text(), "two sensors find room on one line"
+    assert "rate_hz = 333 " in _virtual(read_designs(tmp_path / "skin")[0], 6)
     assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0

@@ -42,6 +42,7 @@ acceleration_deg_s2 = 90
 _MONITORING_TEXT = """\
 [monitoring]                  # a pseudo-terminal on a busy computer can stall for longer than 50 ms"""
 _STALL_MS = 250  # ms
+_LINE_RATE = 2000  # frames a second that a line of 921600 bits a second carries with room to spare
 _TOUCH_START = 2.5  # s after the skin's start: the arm moves at full speed until about 3.4 s
 _TOUCH_END = 2.8  # s
 
@@ -196,7 +197,7 @@ def first_scene(
             number += 1
     if arm is not None and designs[0].thickness is not None:
         lines.append(_padding(designs[0].thickness))
-    lines += _sources(ports, boards) if ports else [_virtual(designs[0])]
+    lines += _sources(ports, boards) if ports else [_virtual(designs[0], number)]
     if arm is not None:
         lines.append('[reaction]\nkind = "stop"               # retreat and comply need `coneskin commission`\n')
     lines.append('[recording]\nfolder = "runs"\n')
@@ -241,10 +242,11 @@ def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
     return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: end 1 along the link from the joint; the design knew no link"
 
 
-def _virtual(design: DesignFolder) -> str:
+def _virtual(design: DesignFolder, count: int) -> str:
     cone = design.sensors[0].frustum
+    rate = f"rate_hz = {_LINE_RATE // count}               # of each sensor: one line carries them all\n"
     return (
-        '[source]\nkind = "virtual"\n\n'
+        f'[source]\nkind = "virtual"\n{rate if count > 2 else ""}\n'
         f"[[source.touch]]\nstart_s = {_TOUCH_START:g}\nend_s = {_TOUCH_END:g}\n"
         f"u_mm = {0.5e3 * cone.slant:.1f}\nphi_deg = {math.degrees(0.5 * cone.wrap):.1f}\n"
     )
