@@ -55,7 +55,9 @@ BENCHES = {
     ),
     "bare-sides": Bench("bench.collision.bare_sides", "Friction in the joints, and noise of their currents."),
     "collision-settled": Bench("bench.collision.settled", "A real controller may end such a motion first (C153)."),
-    "impact-foams": Bench("bench.impact.foams", "A real foam: how its force hangs on time, temperature and age."),
+    "impact-foams": Bench(
+        "bench.impact.foams", "A real foam: how its force hangs on time, temperature and age.", one_thread=True
+    ),
     "impact-agreement": Bench(
         "bench.impact.agreement", "Other links, other arms, and pushes by more than one joint: it bounds nothing."
     ),

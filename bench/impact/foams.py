@@ -16,6 +16,8 @@ from bench.report import head, quantile, show
 from coneskin.impact.permissible_speed.speed_map import permissible_speed, softest
 from tests.support.foams import KINDS, judge, off, random_case
 
+TRUSTED_COUNT = 60  #: cases that are also judged at the speed of a table that is taken as exact
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -30,16 +32,18 @@ def main() -> None:
         foam, region, at = random_case(chance)
         soft, limits = softest(foam, region.limits)
         speed = permissible_speed(lambda v, at=at, soft=soft: [at(v, soft)], limits)
-        trusting = permissible_speed(lambda v, at=at, foam=foam: [at(v, foam)], region.limits)
         if speed <= 0.0:
             continue
-        slower.append(speed / trusting)
         kind = KINDS[number % len(KINDS)]
         contact = at(speed, foam)
         deepest = judge(contact, off(foam, "softer", chance, 1.0), foam.loss)[2]
         law = off(foam, kind, chance, deepest)
         peak, lasting, _ = judge(contact, law, foam.loss)
         shares[kind].append(max(peak / region.limits.transient, lasting / region.limits.lasting))
+        if number >= TRUSTED_COUNT:
+            continue
+        trusting = permissible_speed(lambda v, at=at, foam=foam: [at(v, foam)], region.limits)
+        slower.append(speed / trusting)
         peak, lasting, _ = judge(at(trusting, foam), law, foam.loss)
         plain += peak > region.limits.transient or lasting > region.limits.lasting
     rows = [

@@ -62,11 +62,11 @@ def judge(contact: TwoMassContact, foam: _Law, loss: float) -> tuple[float, floa
     arm, body = contact.arm, contact.body
     tissue = body.tissue
 
+    depths = np.linspace(0.0, 0.03, 3001)  # of a foam in series with the tissue
+    totals = depths + np.array([foam(s) for s in depths]) / tissue
+
     def depth(total: float) -> float:
-        """Indentation of a foam in series with the tissue."""
-        if total <= 0.0 or math.isinf(tissue):
-            return max(0.0, total)
-        return float(brentq(lambda s: s + foam(s) / tissue - total, 0.0, total, xtol=1e-12))
+        return float(np.interp(total, totals, depths))
 
     def force(total: float, rate: float) -> float:
         s = depth(total)
