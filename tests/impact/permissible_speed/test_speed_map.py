@@ -167,3 +167,22 @@ def test_a_speed_keeps_the_limits_also_without_the_extra_way(monkeypatch: pytest
     maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
     without, with_it = (maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(lag), 9.0)].speeds for lag in (0.0, 0.8))
     assert with_it == without
+
+
+def test_a_speed_keeps_the_limits_also_on_the_stiffest_foam(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A body that swings may press it longer; here, because it is met twice as fast."""
+    limits = _parse_limits(FREE)
+    (hand,) = limits.regions
+
+    def harder(speed: float, lever: float, mass: float, region: Any, measured: Any, foam: Padding, extra: Any) -> Any:
+        return contact_at(speed * (2.0 if foam.stiffness > 11e3 else 1.0), lever, mass, region, measured, foam, extra)
+
+    monkeypatch.setattr(speed_map, "contact_at", harder)
+    monkeypatch.setattr(speed_map, "_CURVE_MASSES", (8.0,))
+    monkeypatch.setattr(speed_map, "LEVERS", LEVERS[-1:])
+    maker = speed_map._CurveMaker(limits, Padding(), lambda _: None)
+    (speed,) = maker.curves[maker.number(3, 8.0, 8.0, ExtraWay(), 9.0)].speeds
+    stiffest = Padding().scaled(1.15)
+    assert speed > 0.0
+    assert _keeps(harder(speed, LEVERS[-1], 8.0, hand, limits.measured, stiffest, ExtraWay()), hand.limits)
+    assert not _keeps(harder(1.05 * speed, LEVERS[-1], 8.0, hand, limits.measured, stiffest, ExtraWay()), hand.limits)

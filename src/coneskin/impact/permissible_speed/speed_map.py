@@ -314,8 +314,10 @@ class _CurveMaker:
         padding, limits = softest(self._padding, region.limits)
         for number, lever in enumerate(LEVERS):
 
-            def contacts(speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,)) -> _Contacts:
-                common = region, measured, padding
+            def contacts(
+                speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,), foam: Padding = padding
+            ) -> _Contacts:
+                common = region, measured, foam
                 return [contact_at(speed, lever, mass, *common, way) for way in ways]
 
             least, top = _LEAST_SPEED, _TOP_SPEED
@@ -325,6 +327,10 @@ class _CurveMaker:
             both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
             if found > 0.0 and not all(_keeps(contact, limits) for contact in both(found)):
                 found = permissible_speed(both, limits, least, top)
+            for share in (1.0, 1.0 + padding.spread):  # and one that swings, another foam
+                others = partial(contacts, ways=(extra, _NO_WAY), foam=self._padding.scaled(share))
+                if found > 0.0 and not all(_keeps(contact, region.limits) for contact in others(found)):
+                    found = permissible_speed(others, region.limits, least, found)
             speeds.append(found)
         for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
             speeds[number] = min(speeds[number], speeds[number + 1])
