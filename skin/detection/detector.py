@@ -152,7 +152,8 @@ class Detector:
         resting = frame.touch_c + frame.touch_d < 2.0 * self._release * frame.touch_supply
         if resting and zero.feed(frame, self.timing.period, not self.ready):
             self._currents.restart()  # what was learned of them had another zero
-        frame = zero.take_off(frame)
+        if zero.counts:
+            frame = zero.take_off(frame)
         reading = read(self.sensor, frame, self._inversion, self._currents.noise)
         whole, fault = reading.level, reading.fault
         if fault is Fault.LEAK and resting and not zero.known:

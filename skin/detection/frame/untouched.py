@@ -210,8 +210,6 @@ class UntouchedZero:
     def take_off(self, frame: Frame) -> Frame:
         """Return a frame whose drive currents are 0 where none flows; one at full scale stays there."""
         zero, full = self.counts, self._full
-        if not zero:
-            return frame
         touch, radial, angular = frame.touch_current, frame.radial_current, frame.angular_current
         return frame._replace(
             touch_current=touch - zero if touch < full else full,
