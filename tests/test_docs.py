@@ -311,7 +311,7 @@ def sentences(text: str) -> list[str]:
 
 
 #: words of all pages but those of bench/, of README.md and of docs/safety.md
-MOST_WORDS = {"": 42_850, "README.md": 600, "docs/safety.md": 4000}
+MOST_WORDS = {"": 43_300, "README.md": 600, "docs/safety.md": 4000}
 #: expression -> how often it may and must stand in 10 000 words of prose
 RATES = {";": (0, 15), r"\byour?\b": (60, 1000), r"\b(anew|beside|nobody|somebody)\b": (0, 3)}
 LONG_SENTENCES = 0.03  # share of sentences of more than 25 words
