@@ -27,7 +27,9 @@ def board_page(circuit: BoardCircuit) -> str:
         "|---|---|",
         *(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
         "",
-        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else:",
+        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else. At the sensor's plug, both wires of "
+        "an electrode go to its pin: E_A and S_A to 1, those of B to 2, of C to 3, of D to 4. The sensor's own four wires "
+        "have other colours.",
         "",
         "| pole | net | wire |",
         "|---|---|---|",
@@ -38,9 +40,11 @@ def board_page(circuit: BoardCircuit) -> str:
         "| step | what should read |",
         "|---|---|",
         "| no sensor, no board in its socket: 5V, 3V3 to GND | more than 1 kohm, either way |",
+        "| the board by itself, over USB | flashed as below, and only then put into its socket |",
         f"| powered, no sensor: RAIL | {parts.supply_volts:g} V, 2 % |",
         f"| BIAS, AMP | {bias * 1e3:.0f} mV both, within 5 mV |",
-        "| flashed, no sensor: `coneskin monitor` | frames; both drive currents within 2 counts of the zero |",
+        f"| no sensor: `coneskin monitor /dev/ttyACM0 --baud {board.baud} --json` | frames; the drive currents "
+        "within 2 counts of the zero |",
         f"| the zero, `touch_current` | {zero} counts of {count}, {round(0.012 * count)} more or less |",
         f"| `touch_supply` | {parts.supply_volts * volt:.0f} counts |",
         f"| sensor plugged in: `radial_current` | {parts.count_amperes(sensor.radial_amperes)} counts |",

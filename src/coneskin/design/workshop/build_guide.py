@@ -218,8 +218,9 @@ def _test_steps(several: bool) -> Iterator[str]:
         f"{SPREAD:.0%} at most. They are less than a sheet's own, for what lies beside the active area conducts too."
     )
     yield (
-        "Plug it into the board (`coneskin firmware` writes sketch, wiring and parts) and run `coneskin monitor "
-        "PORT`: the untouched frame must read as in the sheet's table, within 3 % once the measured sheets are in the "
+        "Plug it into the board (`coneskin firmware` writes sketch, wiring, parts, and the steps in board.md) and "
+        "run `coneskin monitor PORT --baud RATE`, both as board.md has them: the untouched frame must read as board.md "
+        "says, or with a board of your own as in the sheet's table, within 3 % once the measured sheets are in the "
         "sensor file."
     )
     if several:
@@ -427,7 +428,8 @@ def sheet_lines(
     radial, angular = (pair.ohms / (pair.squares * pair.sheet_ohms) for pair in (ab, cd))
     counts = ", ".join(f"{name} {count}" for name, count in figures.frame.items() if count)
     yield (
-        f"Untouched frame, in counts of `coneskin monitor`: {counts}, all others 0. The model of the sensor ends at "
+        f"Untouched frame, in counts, of a board with the electronics of the sensor file: {counts}, all others 0. "
+        "Other boards count otherwise: see board.md. The model of the sensor ends at "
         "its electrodes, the sheets do not: until the measured sheets are in the file, radial_current reads "
         f"{1.0 / radial:.0%} and angular_current {1.0 / angular:.0%} of these."
     )
