@@ -36,7 +36,8 @@ from .limits import MonitoringLimits
 _POLL_PERIOD = 0.01  # s between two looks
 _STOP_POLL_PERIOD = 0.002  # s; while a stop is under way
 _CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
-_ORPHAN_TIME = 1.0  # s without program, guard and states, from which on stops reach nobody: none stays for 2 s
+_ORPHAN_TIME = 1.0  # s without program and states, from which on stops reach nobody: none stays for 2 s ...
+_LONELY_TIME = 0.6  # s without the guard, in which a stop is tried all the same, by connections that are opened first
 
 
 class _GuardWatchdog:
@@ -63,7 +64,7 @@ class _GuardWatchdog:
         self._hold = hold
         self._patience = UNGUARDED_TIME if second else GUARD_SILENCE
         self._sign = StatusReport("alive", "second" if second else "").encode()
-        self._left_at = math.inf  # when the guarded program left [s]
+        self._left_at = self._gone_at = math.inf  # when the guarded program left, and the guard [s]
         self._ended = False  # the guard, in order
         self._asked: StopProgram | None = None  # a stop that waits for the one under way
         self._clock = clock
@@ -96,6 +97,8 @@ class _GuardWatchdog:
                 case StopProgram() as stop:
                     self._asked = stop  # of several that have waited the newest
         gone = self._guard.closed
+        if gone:
+            self._gone_at = min(self._gone_at, now)
         if hold.stopping or (self._alone and self._asked is None):
             outcome = hold.poll()
             if outcome and self._alone:  # tell the program whether the arm stands, where that is known now
@@ -112,7 +115,8 @@ class _GuardWatchdog:
             what = f"the guard was silent for {self._patience:g} s, the arm was stopped"
             self._guard.send(StatusReport("error", what).encode())
             hold.begin()
-        if gone and now - self._left_at > _ORPHAN_TIME and hold.states_missing():
+        alone, unseen = now - self._gone_at, now - self._left_at
+        if alone > _LONELY_TIME and unseen > _ORPHAN_TIME and hold.states_missing(unseen):
             if hold.stopping:  # nothing was said of this stop yet
                 self._session.send(encode_json({"stands": False}))
             return False

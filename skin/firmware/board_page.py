@@ -27,9 +27,9 @@ def board_page(circuit: BoardCircuit) -> str:
         "|---|---|",
         *(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
         "",
-        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else. At the sensor's plug, both wires "
-        "of an electrode go to its pin: E_A and S_A to 1, those of B to 2, of C to 3, of D to 4. The sensor's own four "
-        "wires have other colours.",
+        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else. At the sensor's plug, both "
+        "wires of an electrode go to its pin: E_A and S_A to 1, those of B to 2, of C to 3, of D to 4. The sensor's "
+        "own four wires have other colours.",
         "",
         "| pole | net | wire |",
         "|---|---|---|",

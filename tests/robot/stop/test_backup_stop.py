@@ -231,3 +231,54 @@ def test_a_watchdog_that_is_left_alone_leaves_within_two_seconds_only_where_no_s
         assert [decode_json(message) for message in program.receive()] == [{"stands": False}]
     for channel in (guard, of_guard, session, program):
         channel.close()
+
+
+@pytest.fixture
+def lonely(world):
+    """A watchdog beside a world, its guard, and its program; and what takes time on with it."""
+
+    def make(second):
+        (guard, of_guard), (session, program) = (map(Channel, pair()) for _ in range(2))
+        channels.extend((guard, of_guard, session, program))
+        world.fileno = session.fileno
+        reader = None if second else world
+        hold = StandstillHold(world, world, MonitoringLimits(), 10.0, reader, clock=world.clock)
+        return _GuardWatchdog(guard, session, hold, second=second, clock=world.clock), of_guard, program
+
+    channels = []
+    yield make
+    for channel in channels:
+        channel.close()
+
+
+def goes_on(watchdog, world, until, beats=None):
+    while world.now < until:
+        if beats is not None:
+            beats.send(Heartbeat().encode())
+        if not watchdog.poll(0.0):
+            return False
+    return True
+
+
+def test_a_pause_of_the_states_long_after_all_have_gone_lets_no_moving_arm_go(world, lonely):
+    world.speed = 1.0
+    watchdog, of_guard, program = lonely(second=False)
+    of_guard.send(Heartbeat().encode())
+    assert watchdog.poll(0.0)
+    of_guard.close()
+    program.send(LEAVE)
+    assert goes_on(watchdog, world, world.now + 10.0)
+    world.talks = False
+    assert goes_on(watchdog, world, world.now + 1.5)
+
+
+def test_the_second_watchdog_stops_the_arm_of_a_guard_that_ends_well_after_its_program(world, lonely):
+    world.speed = 1.0
+    watchdog, of_guard, program = lonely(second=True)
+    assert goes_on(watchdog, world, world.now + 0.3, of_guard)
+    program.send(LEAVE)
+    assert goes_on(watchdog, world, world.now + 1.2, of_guard)
+    of_guard.close()
+    since = world.now
+    assert goes_on(watchdog, world, world.now + 3.0)
+    assert StopPath.PROGRAM in world.paths(since)

@@ -52,6 +52,8 @@ def test_a_padding_is_a_table_of_force_over_depth() -> None:
             ARM + "[padding]\ndepths_mm = [1, 2]\nforces_n = [5]\n",
             "a force for each depth, got 2 depths_mm and 1 forces_n",
         ),
+        (ARM + TABLE.replace("5, 9.5", "42, 60"), "forces_n must begin with at most 10 N, got 42 N"),
+        (ARM + TABLE + "hard_n_per_mm = 1\n", "at least the last slope of the table, got 1 N/mm behind 4.5 N/mm"),
         (ARM + TABLE + "thickness_mm = 6\n", "depths_mm and forces_n stand in place of thickness_mm"),
         (ARM + TABLE.replace("9.5", "4"), "must rise, got 4 N at 2 mm after 5 N at 1 mm"),
         (

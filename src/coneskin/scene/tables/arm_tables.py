@@ -148,6 +148,9 @@ def _body(row: Mapping[str, Any], where: str, problems: list[str]) -> BodyScene 
     return BodyScene(**{name: value for name, value in values.items() if value is not None})
 
 
+_FIRST_FORCE = 10.0  # N
+
+
 def _padding(table: Mapping[str, Any], problems: list[str]) -> Padding:
     """Return the padding of a scene's skins; what has a mistake has its default."""
     from coneskin.skin.materials import Padding
@@ -159,8 +162,18 @@ def _padding(table: Mapping[str, Any], problems: list[str]) -> Padding:
     if len(depths) != len(forces):
         problems.append(f"padding needs a force for each depth, got {len(depths)} depths_mm and {len(forces)} forces_n")
         return Padding()
+    if forces and forces[0] > _FIRST_FORCE:
+        first = f"padding: forces_n must begin with at most {_FIRST_FORCE:g} N, got {forces[0]:g} N"
+        problems.append(
+            f"{first}: the line from 0 to it counts work that no foam takes; measure from the first touch on"
+        )
     try:
-        return Padding(thickness, stiffness, hard, loss, tuple(zip(depths, forces, strict=True)), spread)
+        padding = Padding(thickness, stiffness, hard, loss, tuple(zip(depths, forces, strict=True)), spread)
+        last = padding.pieces[-2][2]
+        if depths and hard < last:
+            was = f"{1e-3 * hard:g} N/mm behind {1e-3 * last:g} N/mm"
+            problems.append(f"padding: hard_n_per_mm must be at least the last slope of the table, got {was}")
+        return padding
     except SensorError as exc:
         problems.append(f"padding: {exc}")
         return Padding()
