@@ -73,6 +73,6 @@ def write(target: Path) -> None:
     shutil.copy(ROOT / "LICENSE", target.parent)
 
 
-if SOURCE.is_dir():
+if (SOURCE / "coneskin" / "robot" / "sim").exists():
     write(HERE / "sim_ur")
 setup()

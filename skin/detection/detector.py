@@ -157,6 +157,7 @@ class Detector:
         reading = read(self.sensor, frame, self._inversion, self._currents.noise)
         whole, fault = reading.level, reading.fault
         if fault is Fault.LEAK and resting and not zero.known:
+            self.timing.seen_valid(now)
             return events  # the first frames tell what no current reads
         if ((fault is None and resting) or fault is Fault.LEAK) and zero.explains(frame):
             self._skip()

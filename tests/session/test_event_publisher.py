@@ -238,6 +238,36 @@ def test_mqtt_carries_the_events_by_a_broker(broker: int) -> None:
     assert got["cell/7/ending"] == {"t": 3.0, "name": "ending", "arm": "UR5e at 127.0.0.1", "what": "told to end"}
 
 
+@pytest.fixture
+def deaf_broker() -> Iterator[int]:
+    """A broker that takes a connection and reads nothing more; the port."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        taken: list[socket.socket] = []
+
+        def serve() -> None:
+            connection, _ = listening.accept()
+            taken.append(connection)
+            connection.recv(1024)
+            connection.sendall(b"\x20\x02\x00\x00")  # CONNACK
+
+        server = threading.Thread(target=serve, daemon=True)
+        server.start()
+        yield listening.getsockname()[1]
+        server.join()
+        taken[0].close()
+
+
+def test_what_a_broker_does_not_read_is_dropped_and_counted(deaf_broker: int) -> None:
+    pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
+    publisher = EventPublisher(f"mqtt://127.0.0.1:{deaf_broker}")
+    long = CONTACT._replace(details={"what": "x" * 6000})
+    while not publisher.dropped:  # the system's own buffers take some megabytes
+        publisher.publish(long, 10.0)
+        assert publisher.sent < 10_000
+    publisher.close()
+
+
 def test_a_broker_that_is_not_there_is_said_before_anything_is_guarded() -> None:
     pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
     port = free_port()

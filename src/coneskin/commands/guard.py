@@ -65,7 +65,14 @@ def run(args: argparse.Namespace) -> int:
 
     with contextlib.ExitStack() as stack:
         opened = (contextlib.closing(EventPublisher(url, args.publish_beyond, scene.arm_label)) for url in args.publish)
-        return _guard(args, scene, [stack.enter_context(publisher) for publisher in opened])
+        publishers = [stack.enter_context(publisher) for publisher in opened]
+        try:
+            return _guard(args, scene, publishers)
+        finally:
+            for url, publisher in zip(args.publish, publishers, strict=True):
+                if publisher.dropped:
+                    counts = f"{publisher.dropped} of {publisher.sent + publisher.dropped} events"
+                    print(f"coneskin guard: {counts} were not taken by {url.rpartition('@')[2]}", file=sys.stderr)
 
 
 def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPublisher]) -> int:

@@ -11,6 +11,7 @@ import json
 import queue
 import socket
 import threading
+from collections import deque
 from collections.abc import Callable
 from urllib.parse import urlsplit
 
@@ -58,15 +59,18 @@ def _open_zmq(host: str, port: int) -> _Channel:
         raise SceneError([f"cannot publish at {address}: {exc.strerror}; name another port"], "--publish") from exc
 
     def send(name: str, data: bytes) -> None:
-        if sock.closed:
-            raise OSError("closed")
-        sock.send_multipart([name.encode(), data], zmq.NOBLOCK)
+        try:
+            sock.send_multipart([name.encode(), data], zmq.NOBLOCK)
+        except zmq.ZMQError as exc:  # closed, by another thread too
+            raise OSError(exc.strerror) from exc
 
     return send, lambda: context.destroy(linger=_ZMQ_CLOSE_TIMEOUT)
 
 
 _ANSWER_TIMEOUT = 5.0  # s for the broker to answer
 _MQTT_CLOSE_TIMEOUT = 0.5  # s for the last events to leave
+_MAX_WAITING = 200  # events that a broker has not read; further ones are dropped
+_MAX_TOPIC = 1000  # letters; a broker takes 65 535 bytes
 
 
 def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str | None) -> _Channel:
@@ -77,11 +81,12 @@ def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str
         MissingExtra: paho-mqtt is not installed.
     """
     try:
-        from paho.mqtt.client import Client
+        from paho.mqtt.client import Client, MQTTMessageInfo
         from paho.mqtt.enums import CallbackAPIVersion
     except ModuleNotFoundError as exc:
         raise MissingExtra("paho-mqtt", "publishing by MQTT", "mqtt") from exc
     answers: queue.SimpleQueue[str] = queue.SimpleQueue()
+    waiting: deque[MQTTMessageInfo] = deque()
     ended = threading.Event()
     client = Client(CallbackAPIVersion.VERSION2)  # no callback holds it: no circle of references
     client.on_connect = lambda *said: answers.put(str(said[3]) if said[3].is_failure else "")
@@ -91,7 +96,12 @@ def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str
     client.connect_timeout = _ANSWER_TIMEOUT
 
     def send(name: str, data: bytes) -> None:
-        if client.publish(f"{topic}/{name}", data).rc:
+        while waiting and (waiting[0].rc or waiting[0].is_published()):
+            waiting.popleft()
+        if not client.is_connected() or len(waiting) >= _MAX_WAITING:
+            raise OSError("not connected, or the broker does not read")
+        waiting.append(client.publish(f"{topic}/{name}", data))
+        if waiting[-1].rc:
             raise OSError("not connected")
 
     def close() -> None:
@@ -135,9 +145,18 @@ class EventPublisher:
             parts = urlsplit(url)
             host, port, topic = parts.hostname, parts.port, parts.path.strip("/")
             known = parts.scheme == "mqtt" or (parts.scheme in ("udp", "zmq") and not topic)
+            known = known and "+" not in topic and len(topic) <= _MAX_TOPIC
         except ValueError:  # a port of words, half a bracket
             host, port, known = None, None, False
-        if not known or not host or not port or parts.query or parts.fragment or "+" in topic:
+        if (
+            not known
+            or not host
+            or not port
+            or parts.query
+            or parts.fragment
+            or "+" in topic
+            or len(topic) > _MAX_TOPIC
+        ):
             raise SceneError([f"an address to publish to is {_URL_FORMS}, got {url!r}; {_URL_EXAMPLE}"], "--publish")
         try:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
