@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shlex
 import sys
 from pathlib import Path
@@ -103,3 +104,11 @@ def test_permissible_speeds_name_the_key_and_the_next_command(
     assert shlex.split(lines[-1])[-4:] == ["coneskin", "doctor", words[1], "--check"]
     value = next(line for line in lines if "speed_limit_from" in line).split(" = ")[1]
     assert json.loads(value) == "speeds/impact.toml"  # from the scene's folder, not from where the command runs
+
+
+def test_lines_whose_reader_has_gone_go_nowhere() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "w", encoding="utf-8") as gone:
+        print_line("a guard says this", gone)
+        print_line("and goes on", gone)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 import queue
 import signal
 import sys
@@ -39,10 +40,16 @@ def print_hint(text: str) -> None:
 
 
 def print_line(text: str, file: TextIO | None = None) -> None:
-    """Print a line in one piece, to the standard output or a file: lines of several threads never share one."""
+    """Print a line in one piece, to the standard output or a file: lines of several threads never share one.
+
+    Where its reader has gone, as head does, lines go nowhere from then on: no guard ends with who reads of it.
+    """
     stream = sys.stdout if file is None else file
-    stream.write(f"{text}\n")
-    stream.flush()
+    try:
+        stream.write(f"{text}\n")
+        stream.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def typed_lines() -> queue.SimpleQueue[str]:
