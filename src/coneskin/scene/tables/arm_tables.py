@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import re
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,7 +20,8 @@ if TYPE_CHECKING:
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.materials import Padding
 
-_HOST_AND_MORE = re.compile(r"/|^[^:]*:[^:]*$")  # a scheme, a path, or a port; an IPv6 address has two colons or more
+#: in a text that may have a scheme, a user, a port and a path as well
+_HOST_IN_TEXT = re.compile(r"(?:\w+://|(?!\w+://))(?:[^@/]*@)?(?:\[([^]]+)\]|([\w.-]+))")
 _WAYPOINT_KEYS = (replace(k.MOTION_KEYS[0], name="q_deg"),)
 _RULE_CONDITIONS = ("link", "level_above", "speed_above")  # of a rule
 #: keys that a kind must have, because nothing is known that holds for all
@@ -56,14 +58,24 @@ def _arm(table: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
             del values["model"]
     if not values.get("host", "?").strip():
         problems.append("arm.host must name the controller, got an empty text")
-    elif _HOST_AND_MORE.search(host := values.get("host", "").strip()):
-        alone = host.rpartition("://")[2].partition("/")[0].partition(":")[0]
-        remedy = f'write "{alone}": the ports are those of the arm\'s model'
-        problems.append(f"arm.host must be a name or address, without scheme, port or path, got {host!r}; {remedy}")
+    elif not _is_host(host := values.get("host", "?").strip()):
+        alone = _HOST_IN_TEXT.match(host)
+        remedy = f'write "{alone[1] or alone[2]}"' if alone else "write such as 10.0.0.2"
+        what = f"arm.host must be a name or address, without scheme, port or path, got {host!r}"
+        problems.append(f"{what}; {remedy}: the ports are those of the arm's model")
     if len(values) < len(k.ARM_KEYS):
         return None
     del values["speed_limit_from"]  # the table stands in place of it
     return ArmScene(watchdog_hz=values.pop("watchdog"), **values)
+
+
+def _is_host(text: str) -> bool:
+    """Tell whether a text may be a computer's name or address, of either version."""
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        return re.fullmatch(r"[\w.-]+|\?", text) is not None
+    return True
 
 
 def _monitoring(table: Mapping[str, Any], problems: list[str]) -> MonitoringLimits:
