@@ -35,7 +35,7 @@ PAGES = {
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 }
 #: pages whose blocks start processes, or compute for seconds
-LONG = {"README.md", "docs/learn/first-collision.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
+LONG = {"README.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
 LONG |= {
     f"docs/do/{name}.md"
     for name in (
@@ -225,8 +225,9 @@ def page_run(tmp_path: Path) -> Iterator[PageRun]:
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs pseudo-terminals and loopback addresses")
-@pytest.mark.parametrize(
-    "page", [pytest.param(page, marks=[pytest.mark.long] if page in LONG else []) for page in PAGES]
+@pytest.mark.parametrize(  # the tutorial runs as its notebook, in test_notebook
+    "page",
+    [pytest.param(p, marks=[pytest.mark.long] if p in LONG else []) for p in PAGES if "first-collision" not in p],
 )
 def test_the_blocks_of_a_page_run(page: str, page_run: PageRun) -> None:
     for block in blocks(PAGES[page]):

@@ -24,10 +24,12 @@ def _calls(path: Path) -> set[str]:
 #: a name on this computer, at which who is refused asks whose it is; nothing is read from it
 _NAMES = {"src/coneskin/session/guard_run.py": {"bind", "listen"}}
 _PAGES = {"src/coneskin/view/page_server.py": {"bind"}}  # viser listens: of a page to look at, or of the designer's
+_PUBLISHER = {"src/coneskin/session/event_publisher.py": {"bind"}}  # of ZeroMQ, where --publish asks for it
 
 
 @pytest.mark.long
 @pytest.mark.promise("P65")
 def test_only_the_simulated_controller_and_the_pages_open_ports() -> None:
     found = {str(path.relative_to(ROOT)): opened for path in sources() if (opened := _calls(path))}
-    assert found == {"robot/sim/server.py": {"bind", "listen"}, "robot/sim/process.py": {"bind"}, **_NAMES, **_PAGES}
+    simulator = {"robot/sim/server.py": {"bind", "listen"}, "robot/sim/process.py": {"bind"}}
+    assert found == {**simulator, **_NAMES, **_PAGES, **_PUBLISHER}

@@ -138,7 +138,7 @@ def test_a_real_link_with_pictures(tmp_path):
     mesh = DATA / "xarm" / "uf850_link4.stl"
     assert main(["design", str(mesh), "-o", str(tmp_path / "out"), "--max-sheets", "1"]) == 0
     pictures = sorted(path.name for path in (tmp_path / "out" / "pictures").iterdir())
-    kinds = ("deviation", "jig", "layout", "stack")
+    kinds = ("deviation", "jig", "layout", "parts", "seam", "stack")
     assert pictures == ["link.png", *(f"sheet-1-{kind}.png" for kind in kinds)]
     report = (tmp_path / "out" / "report.md").read_text()
     for name in pictures:

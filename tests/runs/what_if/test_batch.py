@@ -97,14 +97,14 @@ from pathlib import Path
 import distributed
 
 from coneskin.core.errors import RecordingError
-from coneskin.runs.what_if import batch
+from coneskin.runs.what_if import what_if
 from coneskin.runs.what_if.what_if import judge_runs
 
 if __name__ == "__main__":
     paths, variants = [Path(word) for word in sys.argv[2:]], json.loads(sys.argv[1])
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         rows = judge_runs(paths, variants, scheduler=cluster.scheduler_address)
-        batch._CONNECT_TIMEOUT = 0.5
+        what_if._CONNECT_TIMEOUT = 0.5
         mute = socket.create_server(("127.0.0.1", 0))
         said = []
         for address in ("tcp://127.0.0.1:1", "nonsense", f"tcp://127.0.0.1:{mute.getsockname()[1]}", "foo://localhost:1"):
