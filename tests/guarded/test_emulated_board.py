@@ -72,6 +72,7 @@ def has_fault(session):
     ids=["killed", "browned out", "watchdog fired", "supply sags", "unplugged"],
 )
 def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(controller, board, lines, named):
+    silent = "no valid frame has come for too long"
     for _ in range(5):  # an emulator that a busy computer lets wait sends its frames too late, which is a fault before
         with guard(board_scene(controller.host, board.path)) as session:
             thread, raised = moving(session)
@@ -86,6 +87,8 @@ def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(control
             fault = session.wait_for(("fault",), DEADLINE)
             assert_stopped_on_the_way(controller)
             thread.join(DEADLINE)
+            if silent in fault.details["what"] and silent not in named:
+                continue  # it took the emulator longer to start anew than a board
             assert named in fault.details["what"]
             assert isinstance(raised[0], RobotRefused)
             assert named in str(raised[0])
