@@ -149,7 +149,7 @@ class SceneSolver:
         size = np.abs(self._waves)[:, None]
         factorials = np.array([float(math.factorial(m)) for m in n.tolist()])
         images = -(self._waves[:, None] ** n) / (
-            size * np.expm1(np.minimum(2.0 * self._sigma * size, 700.0)) * factorials
+            size * np.expm1(np.minimum(2.0 * self._sigma * size, 600.0)) * factorials
         )
         signed = binomials * (-1.0) ** j
         kernel = np.array([binomials, -self._odd * binomials, self._odd * signed, -signed]) / (2.0 * math.pi)
