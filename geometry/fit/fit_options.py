@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -11,6 +10,7 @@ import numpy as np
 
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError
+from coneskin.core.text import suggest
 
 from .touch_weights import TouchWeights
 
@@ -110,9 +110,7 @@ def check_names(names: Iterable[str], more: tuple[str, ...] = ()) -> None:
     known = [*(item.name for item in fields(FitOptions)), *more]
     for name in names:
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.5)
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(sorted(known))}"
-            raise GeometryError(f"{name} is no option of the search for sheets; {hint}")
+            raise GeometryError(f"{name} is no option of the search for sheets; {suggest(name, sorted(known))}")
 
 
 def _check_count(name: str, value: int, least: int, most: int) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import io
 import os
@@ -12,7 +11,7 @@ from collections.abc import Sequence
 
 from .core.errors import ConeSkinError, MissingExtra
 from .core.help_text import HelpFormatter
-from .core.text import printable
+from .core.text import printable, suggest
 from .core.version import __version__, code_build
 
 _SHELLS = ("bash", "zsh", "fish", "powershell")
@@ -135,17 +134,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         parser.print_help(sys.stderr)
         return 2
     if chosen is not None and run is None and chosen == words[0]:
-        near = difflib.get_close_matches(chosen, COMMANDS, 1, 0.5)
-        parser.error(
-            f"there is no command {chosen}; "
-            + (
-                "coneskin doctor SCENE --check does that"
-                if chosen in _CHECK_WORDS
-                else f"did you mean {near[0]}?"
-                if near
-                else f"there are {', '.join(COMMANDS)}"
-            )
-        )
+        said = "coneskin doctor SCENE --check does that" if chosen in _CHECK_WORDS else suggest(chosen, COMMANDS)
+        parser.error(f"there is no command {chosen}; {said}")
     args = parser.parse_args(words)
     assert run is not None  # argparse has ended the program otherwise
     try:

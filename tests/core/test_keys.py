@@ -101,7 +101,7 @@ def test_all_mistakes_at_once() -> None:
         ({"length_m": 0.25}, "unknown key length_m; did you mean length_mm?"),
         ({"length": 0.25}, "unknown key length; did you mean length_mm?"),
         ({"lenght_mm": 250}, "unknown key lenght_mm; did you mean length_mm?"),
-        ({"zzz": 1}, "unknown key zzz; known here: length_mm, turn_deg, count"),
+        ({"zzz": 1}, "unknown key zzz; known: length_mm, turn_deg, count"),
         ({"turn_deg": 0}, "above 0 to 360 deg, got 0.0 deg"),
         ({"count": 11}, "a whole number from 0 to 10, got 11"),
         ({"count": True}, "a whole number from 0 to 10, got True"),

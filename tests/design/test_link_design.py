@@ -137,7 +137,7 @@ def test_a_mesh_on_which_nothing_fits_is_refused_with_the_search(monkeypatch: py
 @pytest.mark.parametrize(
     ("link", "named", "said"),
     [
-        (cs.Frustum(0.05, 0.05, 0.2), {"foo": 1}, "foo is no option of the search for sheets; known are allow_hull, "),
+        (cs.Frustum(0.05, 0.05, 0.2), {"foo": 1}, "foo is no option of the search for sheets; known: allow_hull, "),
         (cs.Frustum(0.05, 0.05, 0.2), {"max_sheet": 1}, "did you mean max_sheets?"),
         (cs.Frustum(54, 70, 150), {}, "radius1 must be at most 5 m, got 54 m: lengths are in meters, 54 mm is 0.054"),
         ([cs.PlacedFrustum(cs.Frustum(0.05, 0.05, 200))], {}, "height must be at most 5 m, got 200 m"),

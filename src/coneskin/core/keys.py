@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from .text import suggest
+
 _RAD_PER_DEG = math.pi / 180.0  # rad
 _KEY_UNITS: Mapping[str, tuple[float, str]] = {
     "_n_per_mm": (1e3, "N/mm"),
@@ -161,11 +163,9 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
     known = {key.name: key for key in keys}
     for name in table:
         if name not in known:
-            near = _nearest(name, known)
-            problems.append(
-                f"{where}: unknown key {name}; "
-                + (f"did you mean {near}?" if near else f"known here: {', '.join(known)}")
-            )
+            stem = name.rsplit("_", 1)[0]
+            same = [key.name for key in keys if key.plain in (stem, name)]  # with another unit, or with none
+            problems.append(f"{where}: unknown key {name}; {suggest(name, same[:1] or known)}")
     values: dict[str, Any] = {}
     for key in keys:
         if key.default is not ...:
@@ -178,14 +178,6 @@ def check(table: Mapping[str, Any], keys: Sequence[Key], where: str, problems: l
         if found is not None:
             values[key.plain] = found
     return values
-
-
-def _nearest(name: str, known: Mapping[str, Key]) -> str | None:
-    import difflib  # where something is wrong, and not at each start
-
-    stem = name.rsplit("_", 1)[0]
-    same = [other for other, key in known.items() if key.plain == stem or key.plain == name]
-    return next(iter(same or difflib.get_close_matches(name, known, 1, 0.6)), None)
 
 
 def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) -> Any:

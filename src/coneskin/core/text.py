@@ -10,13 +10,22 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, TextIO
 
 _MAX_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
 _HALF_PAIR = re.compile(rb"\\u[dD][89a-fA-F]")
 _COLOR_CODES = {"red": 31, "green": 32, "yellow": 33, "blue": 34}
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """Return the end of "there is no such name; ...": the known name that was probably meant, or all of them."""
+    import difflib  # where something is wrong, and not at each start
+
+    names = list(known)
+    near = difflib.get_close_matches(name, names, 1, 0.5)
+    return f"did you mean {near[0]}?" if near else f"known: {', '.join(names)}" if names else "there is none at all"
 
 
 def read_json(data: bytes) -> Any:

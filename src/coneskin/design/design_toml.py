@@ -6,7 +6,6 @@ the default of that field.
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import tomllib
@@ -18,6 +17,7 @@ from typing import Any, get_args
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check, with_meanings
+from coneskin.core.text import suggest
 from coneskin.core.toml_text import parse_toml
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
@@ -271,12 +271,9 @@ def _add(
     """Add the values of some tables in SI, under their plain names."""
     for name, table in tables.items():
         if name not in DESIGN_TABLES:
-            near = difflib.get_close_matches(name, DESIGN_TABLES, 1, 0.5)
             owners = [other for other, (_, keys) in DESIGN_TABLES.items() if name in {key.name for key in keys}]
-            known = f"did you mean {near[0]}?" if near else f"known tables: {', '.join(DESIGN_TABLES)}"
-            if owners:
-                known = f"the key {name} belongs into the table {owners[0]}"
-            problems.append(f"{start}{name}: unknown table; {known}")
+            hint = f"the key {name} belongs into the table {owners[0]}" if owners else suggest(name, DESIGN_TABLES)
+            problems.append(f"{start}{name}: unknown table; {hint}")
         elif not isinstance(table, dict):
             problems.append(f"{start}{name} must be a table, [{name}], got {table!r}")
         else:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.core.errors import KinematicsError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import check
+from coneskin.core.text import suggest
 from coneskin.core.toml_text import parse_toml
 
 from .tables.arm_tables import read_arm_tables
@@ -93,7 +94,7 @@ def parse_scene(
     except ValueError as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
     named = frozenset(tables)
-    problems = [f"unknown table [{t}]; known: {', '.join(TABLES)}" for t in tables if t not in TABLES]
+    problems = [f"unknown table [{t}]; {suggest(t, TABLES)}" for t in tables if t not in TABLES]
     for table in (name for name in TABLES if name not in ("link", "body")):
         several = table == "source" and _is_array_of_tables(tables.get(table))
         if table in tables and not isinstance(tables[table], dict) and not several:

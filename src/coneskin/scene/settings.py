@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import SceneError, SensorError
 from coneskin.core.keys import Key, check
+from coneskin.core.text import suggest
 
 from .reader import TABLES
 from .tables.sensor_tables import sensor_tables
@@ -196,11 +197,7 @@ def _index(items: list[Any], part: str, where: str, room: bool = False) -> int:
 
 
 def _unknown(what: str, part: str, known: list[str]) -> str:
-    import difflib  # where something is wrong, and not at each start
-
-    near = difflib.get_close_matches(part, known, 1, 0.5)
-    said = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}" if known else "there is none at all"
-    return f"there is no {what} {part}; {said}"
+    return f"there is no {what} {part}; {suggest(part, known)}"
 
 
 _DETECTOR_NAME = "detector"  # what their names begin with

@@ -16,6 +16,7 @@ from typing import Any
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
+from coneskin.core.text import suggest
 from coneskin.core.toml_text import parse_toml
 from coneskin.robot.arm.kinematics import link_index
 from coneskin.scene.tables.keys import MAX_SIZE
@@ -137,7 +138,7 @@ def _parse_limits(text: str, name: str = "limits") -> LimitsFile:
         tables = parse_toml(text)
     except ValueError as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
-    problems = [f"unknown table [{table}]; known: limits, measured" for table in tables if table not in _TABLE_KEYS]
+    problems = [f"unknown table [{t}]; {suggest(t, _TABLE_KEYS)}" for t in tables if t not in _TABLE_KEYS]
     for table, what in _TABLE_KEYS.items():
         if not isinstance(tables.get(table), dict):
             problems.append(f"[{table}] is missing: {what}")
