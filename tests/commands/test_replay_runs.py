@@ -19,7 +19,7 @@ def test_a_what_if_shows_differences_and_invents_nothing(capsys: pytest.CaptureF
     assert "NOT confirmed" not in out
     assert re.search(r"touch on forearm skin ended", out)
     assert main(["replay", str(COLLISION), "--set", "reaction.kind=dance"]) == 1
-    assert "reaction.kind must be one of" in capsys.readouterr().err
+    assert "with reaction.kind=dance: 1 mistake\n  reaction.kind must be one of" in capsys.readouterr().err
 
 
 def test_another_scene_is_a_what_if_as_well(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

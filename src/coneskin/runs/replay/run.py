@@ -14,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.errors import RecordingError, RobotConnectionError
+from coneskin.core.errors import RecordingError, RobotConnectionError, SceneError
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import ALL_KINDS, Block, is_time
 from coneskin.core.recording.defects import Defect, DefectKind
@@ -267,7 +267,13 @@ class Run:
         header = self.header
         text = override_settings(header["scene"], settings) if settings else header["scene"]
         folder = Path(header["folder"])
-        return parse_scene(text, header["name"], folder, recorded=True, commissioning=self.commissioning)
+        try:
+            return parse_scene(text, header["name"], folder, recorded=True, commissioning=self.commissioning)
+        except SceneError as exc:
+            if not settings:
+                raise
+            given = ", ".join(f"{name}={value}" for name, value in settings.items())
+            raise SceneError(exc.problems, f"{header['name']} with {given}") from exc
 
     @property
     def commissioning(self) -> Commissioning | None:
