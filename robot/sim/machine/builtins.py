@@ -26,9 +26,8 @@ from coneskin.robot.sim.urscript.value_functions import MAX_LINE, ValueFunctions
 from coneskin.robot.sim.urscript.values import Array, PoseValue, number, numbers, pose_of, show, values_of
 
 from .force_functions import ForceFunctions
-from .io_functions import IoFunctions, index_of
+from .io_functions import IoFunctions, add_host_functions, index_of
 from .moves import MoveFunctions, Wait
-from .script_host import ScriptHost
 from .socket_functions import SocketFunctions
 from .states import PopupNotice, TextNotice
 
@@ -203,13 +202,8 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, Valu
         self.set_payload(self._host.payload, CoG)
 
 
-def _add_reading(name: str, read: Callable[[ScriptHost], Any]) -> None:
-    """Add a function that takes nothing, and returns what it reads of the controller."""
-    setattr(Builtins, name, lambda self: read(self._host))
-
-
 #: name -> what the function returns: positions and speeds of joints [rad], [rad/s], of the tool [m], [m/s], and so on
-_READINGS: dict[str, Callable[[ScriptHost], Any]] = {
+_READINGS: dict[str, Callable[..., Any]] = {
     "get_steptime": lambda host: host.steptime,
     # measured by the arm
     "get_actual_joint_positions": lambda host: Array(host.arm.measured.q),
@@ -245,5 +239,4 @@ _READINGS: dict[str, Callable[[ScriptHost], Any]] = {
     "get_freedrive_status": lambda _: 0,  # it is not restricted by a position close to a limit
 }
 _READINGS["tool_pose"] = _READINGS["get_actual_tcp_pose"]  # its name on CB3
-for _name, _read in _READINGS.items():
-    _add_reading(_name, _read)
+add_host_functions(_READINGS)

@@ -7,216 +7,68 @@ follows them; clients are sent the new state.
 
 from __future__ import annotations
 
-import json
-import time
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import IO, Any
 
-from coneskin.robot.arm.models import arm_model
-from coneskin.robot.sim.motion.arm import CYCLE, SUDDEN_CHANGE, TRIGGERED, SimulatedArm, StopCause
+from coneskin.robot.sim.motion.arm import CYCLE, SUDDEN_CHANGE, TRIGGERED, StopCause
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantLost
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import Value
 
-from .inputs_outputs import ClientInputs, InputWatchdog, Terminals, digital_outputs
+from .inputs_outputs import InputWatchdog, digital_outputs
 from .program import Program
+from .script_host import ScriptHost
 from .states import (
+    FAULT_REPORT,
     MOVING,
+    WARNING_REPORT,
     ErrorNotice,
-    Notice,
     Options,
     ProgramFailed,
     ProgramNotice,
-    Report,
     RobotMode,
     Runtime,
     SafetyMode,
     SafetyNotice,
 )
 
-_PLANT_LOST = 50  # number in the log; that of a real controller which loses its arm depends on the joint
-
-
-class _SafetySystem:
-    """Safety system of one controller: its state, what changes it, and what clients and the log are told.
-
-    It holds neither program nor arm: the controller does, by the state that it finds here.
-
-    Args:
-        unlock_after: time that must pass before a protective stop can be unlocked [s].
-        log: takes an event and its facts.
-        tell: takes what every client of the primary interface is told.
-
-    Attributes:
-        mode: its state.
-        stopped_at: controller time of the last protective stop [s].
-    """
-
-    def __init__(self, unlock_after: float, log: Callable[..., None], tell: Callable[[Notice], None]) -> None:
-        self.mode = SafetyMode.NORMAL
-        self.stopped_at = 0.0
-        self._reduced = False
-        self._unlock_after, self._log, self._tell = unlock_after, log, tell
-
-    def protective_stop(self, reason: str, cause: StopCause, now: float) -> bool:
-        """Begin a protective stop; return False where the arm may not move anyway."""
-        if self.mode not in MOVING:
-            return False
-        self._enter(SafetyMode.PROTECTIVE_STOP)
-        self.stopped_at = now
-        self._log("protective_stop", reason=reason, cause=str(cause))
-        self._tell(ErrorNotice(cause.code, cause.argument, Report.WARNING, reason))
-        return True
-
-    def unlock(self, now: float, early: bool) -> bool:
-        """End a protective stop; return False where it is too early, and that is not allowed."""
-        if self.mode is SafetyMode.PROTECTIVE_STOP:
-            if not early and now - self.stopped_at < self._unlock_after:
-                return False
-            self._log("unlocked")
-            self._release()
-        return True
-
-    def open_safeguard(self) -> bool:
-        """Begin a safeguard stop; return False where the arm may not move anyway."""
-        if self.mode not in MOVING:
-            return False
-        self._enter(SafetyMode.SAFEGUARD_STOP)
-        self._log("safeguard_stop")
-        return True
-
-    def close_safeguard(self) -> None:
-        """End a safeguard stop."""
-        if self.mode is SafetyMode.SAFEGUARD_STOP:
-            self._release()
-
-    def reduce(self, on: bool) -> None:
-        """Begin or end reduced mode, now or once the arm may move."""
-        self._reduced = on
-        if self.mode in MOVING:
-            self._release()
-
-    def emergency_stop(self) -> None:
-        """Act on the emergency stop button."""
-        self._log("emergency_stop")
-        self._enter(SafetyMode.ROBOT_EMERGENCY_STOP)
-
-    def lose_plant(self, reason: str) -> None:
-        """Begin a fault, because the arm is not there any more; nothing ends it."""
-        self._log("plant_lost", reason=reason)
-        self._enter(SafetyMode.FAULT)
-        self._tell(ErrorNotice(_PLANT_LOST, 0, Report.FAULT, reason))
-
-    def restart(self) -> bool:
-        """End an emergency stop; return whether there was one."""
-        if self.mode in (*MOVING, SafetyMode.PROTECTIVE_STOP, SafetyMode.FAULT):
-            return False
-        self.mode = SafetyMode.NORMAL
-        return True
-
-    def _release(self) -> None:
-        self._enter(SafetyMode.REDUCED if self._reduced else SafetyMode.NORMAL)
-
-    def _enter(self, mode: SafetyMode) -> None:
-        self.mode = mode
-        self._tell(SafetyNotice(mode))
-
-
 #: commands that change the power of the arm
 POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
 
 
-def _no_rtde(name: str) -> Any:
-    raise ScriptError(f"{name}: this controller has no RTDE")
-
-
-def _plain(value: object) -> object:
-    return list(value) if isinstance(value, list | tuple) else str(value)
-
-
+_PLANT_LOST = 50  # number in the log; that of a real controller which loses its arm depends on the joint
 _MAX_SECONDARY = 20  # sec programs that run at once
-_MAX_NOTICES = 1000  # that wait to be sent; a program that writes more in a cycle loses the oldest
-_HISTORY_LENGTH = 500  # cycles; the range of get_actual_joint_positions_history
-_REDUCED_SHARE = 0.5  # of the speed slider, in reduced mode; a real controller has limits of its own instead
 _AT_STANDSTILL = {Runtime.STOPPING: Runtime.STOPPED, Runtime.PAUSING: Runtime.PAUSED}
 
 
-class Controller:
-    """Controller of one arm.
-
-    Args:
-        options: its kind.
-        log: file for a JSON line for each event.
-        plant: what its targets move; by default the arm follows them exactly.
+class Controller(ScriptHost):
+    """Controller of one arm; arguments as of `ScriptHost`.
 
     Attributes:
-        cycle: number of control cycles since power-on.
         remote_control: False in local control, in which no program and no command is taken.
-        outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
-        rtde_value: returns the value of an output of RTDE, which those set who know these.
-        inputs: what clients write.
         program: main program; None while none is loaded.
         secondary: ``sec`` programs that run beside it.
-        safety_system: what may stop the arm whatever the program does.
-        notices: what clients are still to be told.
-        history: measured joint positions of the last cycles, oldest first [rad].
         plant_lost: why the plant does not count any more; empty while it does.
     """
 
     def __init__(self, options: Options, log: IO[str] | None = None, plant: Plant | None = None) -> None:
-        self.options = options
-        self.arm = SimulatedArm(arm_model(options.model), options.start_q)
+        super().__init__(options, log)
         self.plant: Plant = KinematicPlant() if plant is None else plant
         self.arm.kinematic = plant is None
         self.plant_lost = ""
-        self.cycle = 0
-        self.inputs = ClientInputs(self.log, options.fieldbus)
-        self.inputs.watchdog_delay = options.watchdog_delay
-        self.arm.deceleration = options.deceleration
-        self.output_ints = [0] * 48
-        self.output_doubles = [0.0] * 48
-        self.digital_outputs = 0
-        self.terminals = Terminals()
-        self.outside_time: Callable[[], float] = lambda: self.timestamp
-        self.rtde_value: Callable[[str], Any] = _no_rtde
-        self.frozen = 0.0  # time in which no cycle ran though its clock went on [s]
-        self.beyond = False  # programs may connect to other computers
-        self.slider = 1.0
         self.resistance = [0.0] * 6  # current that each motor takes beyond the model of the arm [A]
-        self.gravity: tuple[float, ...] = (0.0, 0.0, 9.82)
-        self.payload = 0.0
-        self.payload_cog: tuple[float, ...] = (0.0, 0.0, 0.0)
-        self.payload_inertia: tuple[float, ...] = (0.0,) * 6
         self.program: Program | None = None
         self.secondary: list[Program] = []
         self.runtime = Runtime.STOPPED
         self.robot_mode = RobotMode.RUNNING
         self.remote_control = options.remote_control
-        self.safety_system = _SafetySystem(options.unlock_after, self.log, self.tell)
-        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=_HISTORY_LENGTH)
-        self.notices: deque[Notice] = deque(maxlen=_MAX_NOTICES)
+        self._reduced = False
+        self._stopped_at = 0.0  # controller time of the last protective stop [s]
         self._arrived = 0  # cycle in which the last program came in
         self._due: tuple[int, Translation] | None = None
-        self._log = log
 
     # control cycle
-
-    @property
-    def timestamp(self) -> float:
-        """Time since power-on [s]."""
-        return self.cycle * CYCLE + self.frozen
-
-    @property
-    def speed_scaling(self) -> float:
-        """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
-        return self.slider * _REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
-
-    @property
-    def steptime(self) -> float:
-        """Control cycle, in which each thread of a program takes one turn [s]."""
-        return self.options.steps * CYCLE
 
     def hold_up(self, seconds: float) -> None:
         """Note that the computer has held this controller up: its clock goes on, its arm has stood still meanwhile."""
@@ -254,7 +106,9 @@ class Controller:
         except PlantLost as exc:
             self.plant_lost = str(exc)
             self.plant.close()
-            self.safety_system.lose_plant(self.plant_lost)
+            self.log("plant_lost", reason=self.plant_lost)
+            self._enter(SafetyMode.FAULT)
+            self.tell(ErrorNotice(_PLANT_LOST, 0, FAULT_REPORT, self.plant_lost))
             self.robot_mode = RobotMode.POWER_OFF
             self.stop_program("the plant is lost")
 
@@ -366,15 +220,14 @@ class Controller:
 
     # safety system
 
-    @property
-    def safety(self) -> SafetyMode:
-        """State of the safety system."""
-        return self.safety_system.mode
-
     def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
         """Stop the arm and hold the program, until a person unlocks it."""
-        if not self.safety_system.protective_stop(reason, cause, self.timestamp):
+        if self.safety not in MOVING:
             return
+        self._enter(SafetyMode.PROTECTIVE_STOP)
+        self._stopped_at = self.timestamp
+        self.log("protective_stop", reason=reason, cause=str(cause))
+        self.tell(ErrorNotice(cause.code, cause.argument, WARNING_REPORT, reason))
         if self.options.after_protective_stop == "stop":
             self.stop_program("protective stop")
         else:
@@ -382,20 +235,36 @@ class Controller:
 
     def unlock(self, early: bool = False) -> bool:
         """End a protective stop; return False where it is too early, and that is not allowed."""
-        return self.safety_system.unlock(self.timestamp, early)
+        if self.safety is SafetyMode.PROTECTIVE_STOP:
+            if not early and self.timestamp - self._stopped_at < self.options.unlock_after:
+                return False
+            self.log("unlocked")
+            self._release()
+        return True
 
     def safeguard(self, open: bool) -> str:
         """Open or close the safeguard: the arm brakes, the program is held, and a person has to start it again."""
-        if not open:
-            self.safety_system.close_safeguard()
-        elif self.safety_system.open_safeguard():
+        if open and self.safety in MOVING:
+            self._enter(SafetyMode.SAFEGUARD_STOP)
+            self.log("safeguard_stop")
             self.pause_program()
+        elif not open and self.safety is SafetyMode.SAFEGUARD_STOP:
+            self._release()
         return self.safety.name
 
     def reduce(self, on: bool) -> str:
-        """Begin or end reduced mode, in which paths and speeds are at most `_REDUCED_SHARE` of what is commanded."""
-        self.safety_system.reduce(on)
+        """Begin or end reduced mode, now or once the arm may move: paths and speeds are then half of the commanded."""
+        self._reduced = on
+        if self.safety in MOVING:
+            self._release()
         return self.safety.name
+
+    def _release(self) -> None:
+        self._enter(SafetyMode.REDUCED if self._reduced else SafetyMode.NORMAL)
+
+    def _enter(self, mode: SafetyMode) -> None:
+        self.safety = mode
+        self.tell(SafetyNotice(mode))
 
     def switch_control(self, remote: bool) -> bool:
         """Switch to remote or to local control, as a person does on the pendant; a running program goes on."""
@@ -405,7 +274,8 @@ class Controller:
 
     def emergency_stop(self) -> None:
         """Act on the emergency stop button: the arm brakes and loses power, the program ends."""
-        self.safety_system.emergency_stop()
+        self.log("emergency_stop")
+        self._enter(SafetyMode.ROBOT_EMERGENCY_STOP)
         self.robot_mode = RobotMode.POWER_OFF
         self.stop_program("emergency stop")
 
@@ -423,28 +293,7 @@ class Controller:
             self.set_digital(1 << bit, on)
         self.terminals.write_analog(values)
 
-    def set_digital(self, bit: int, on: bool) -> None:
-        """Switch digital outputs: bits 0-7 standard, 8-15 configurable, 16-17 tool."""
-        self.digital_outputs = self.digital_outputs | bit if on else self.digital_outputs & ~bit
-        self.log("digital", outputs=self.digital_outputs)
-
-    # clients and log
-
-    def tell(self, notice: Notice) -> None:
-        """Keep a notice until the server sends it to every client of the primary interface."""
-        self.notices.append(notice)
-
-    def fail(self, program: str, problem: ScriptError) -> None:
-        """Report a program that cannot be run, or that has failed."""
-        self.log("abort", program=program, reason=str(problem))
-        self.tell(ProgramFailed(problem.title, problem.line, problem.column))
-
-    def log(self, event: str, **facts: Any) -> None:
-        """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
-        if self._log is not None:
-            now, here = round(self.timestamp, 3), time.monotonic()
-            line = {"cycle": self.cycle, "time": now, "monotonic": here, "event": event}
-            self._log.write(json.dumps(line | facts, default=_plain) + "\n")
+    # clients
 
     @property
     def currents(self) -> list[float]:
@@ -479,8 +328,8 @@ class Controller:
             self.robot_mode = RobotMode.POWER_OFF
             return "Powering off"
         if command == "restart safety":
-            if self.safety_system.restart():
-                self.robot_mode = RobotMode.POWER_OFF
+            if self.safety not in (*MOVING, SafetyMode.PROTECTIVE_STOP, SafetyMode.FAULT):
+                self.safety, self.robot_mode = SafetyMode.NORMAL, RobotMode.POWER_OFF
             return "Restarting safety"
         if self.safety in MOVING:
             if command == "brake release":

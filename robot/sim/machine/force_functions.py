@@ -15,7 +15,7 @@ from typing import Any
 from coneskin.robot.sim.urscript.values import ScriptError, number, numbers, show
 
 from .script_host import CallingProgram, ScriptHost
-from .states import ErrorNotice, Report
+from .states import WARNING_REPORT, ErrorNotice
 
 _NOT_SIMULATED = 0  # number of a log entry that only this simulator writes
 
@@ -31,7 +31,7 @@ class ForceFunctions:
         if what not in self._program.told:
             self._program.told.add(what)
             self._host.log("not_simulated", what=what)
-            self._host.tell(ErrorNotice(_NOT_SIMULATED, 0, Report.WARNING, f"not simulated: {what}"))
+            self._host.tell(ErrorNotice(_NOT_SIMULATED, 0, WARNING_REPORT, f"not simulated: {what}"))
 
     # contact
 

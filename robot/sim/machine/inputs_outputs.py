@@ -130,11 +130,15 @@ class ClientInputs:
             self.watchdogs[variable] = InputWatchdog(variable, 1.0 / frequency + self.watchdog_delay, action, cycle)
 
 
-CURRENT = 0  #: domain of an analog terminal
-VOLTAGE = 1  #: the other
-_OUTPUT_RANGES = {CURRENT: (0.004, 0.020), VOLTAGE: (0.0, 10.0)}  # of an output at 0 and at 1 [A], [V]
-_MAX_INPUT = {CURRENT: 0.020, VOLTAGE: 10.0}  # of an input
+_VOLTAGE = 1  # domain of an analog terminal; 0 is a current
+_OUTPUT_RANGES = ((0.004, 0.020), (0.0, 10.0))  # of an output at 0 and at 1, by its domain [A], [V]
+_MAX_INPUTS = (0.020, 10.0)  # of an input, likewise
 _DIGITAL, _ANALOG = 18, 4
+
+
+def with_bits(word: int, bits: int, on: bool) -> int:
+    """Return a word with some bits switched on or off."""
+    return word | bits if on else word & ~bits
 
 
 class Terminals:
@@ -143,7 +147,7 @@ class Terminals:
     Attributes:
         digital_inputs: word of bits.
         analog_inputs: two of the control box and two of the tool [A or V].
-        input_domains: what each of them measures: ``CURRENT`` or ``VOLTAGE``.
+        input_domains: what each of them measures: 0 a current, 1 a voltage.
         ratios: of the two analog outputs, 0..1.
         output_domains: what they give.
         output_bits: boolean registers that programs write, as one word of 128 bits.
@@ -156,9 +160,9 @@ class Terminals:
     def __init__(self) -> None:
         self.digital_inputs = 0
         self.analog_inputs = [0.0] * _ANALOG
-        self.input_domains = [VOLTAGE] * _ANALOG
+        self.input_domains = [_VOLTAGE] * _ANALOG
         self.ratios = [0.0, 0.0]
-        self.output_domains = [VOLTAGE, VOLTAGE]
+        self.output_domains = [_VOLTAGE, _VOLTAGE]
         self.output_bits = 0
         self.flags = 0
         self.tool_voltage = 0
@@ -173,8 +177,7 @@ class Terminals:
         """
         if not 0 <= index < _DIGITAL:
             raise RobotRefused(f"a digital input is a number from 0 to {_DIGITAL - 1}, got {index}")
-        bit = 1 << index
-        self.digital_inputs = self.digital_inputs | bit if on else self.digital_inputs & ~bit
+        self.digital_inputs = with_bits(self.digital_inputs, 1 << index, on)
         return self.digital_inputs
 
     def apply_analog(self, index: int, value: float) -> list[float]:
@@ -185,7 +188,7 @@ class Terminals:
         """
         if not 0 <= index < _ANALOG:
             raise RobotRefused(f"an analog input is a number from 0 to {_ANALOG - 1}, got {index}")
-        largest = _MAX_INPUT[self.input_domains[index]]
+        largest = _MAX_INPUTS[self.input_domains[index]]
         if not 0.0 <= value <= largest:
             raise RobotRefused(f"analog input {index} takes 0 to {largest:g} V or A, got {value:g}")
         self.analog_inputs[index] = value

@@ -13,10 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Generator, Mapping
 from typing import Any
 
+from coneskin.robot.sim.urscript.value_functions import named
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 from coneskin.robot.ur.rtde_codec import VARIABLES
 
-from .inputs_outputs import CURRENT, VOLTAGE
+from .inputs_outputs import with_bits
 from .script_host import CallingProgram, ScriptHost
 
 _REGISTERS, _BITS = 48, 128
@@ -81,35 +82,6 @@ class IoFunctions:
 
     # registers
 
-    def get_rtde_value(self, name: Any) -> Any:
-        """Return the value of an output of RTDE."""
-        return self._host.rtde_value(str(name))
-
-    def read_input_integer_register(self, address: int) -> int:
-        """Return an integer that a client wrote."""
-        return self._host.inputs.read_command(index_of(address, _REGISTERS))
-
-    def read_input_float_register(self, address: int) -> float:
-        """Return a number that a client wrote."""
-        name = f"input_double_register_{index_of(address, _REGISTERS)}"
-        return float(self._host.inputs[name])  # type: ignore[arg-type]
-
-    def read_input_boolean_register(self, address: int) -> bool:
-        """Return a truth value that a client wrote."""
-        return self._host.inputs.read_bit(index_of(address, _BITS))
-
-    def read_output_integer_register(self, address: int) -> int:
-        """Return an integer that a program wrote."""
-        return self._host.output_ints[index_of(address, _REGISTERS)]
-
-    def read_output_float_register(self, address: int) -> float:
-        """Return a number that a program wrote."""
-        return self._host.output_doubles[index_of(address, _REGISTERS)]
-
-    def read_output_boolean_register(self, address: int) -> bool:
-        """Return a truth value that a program wrote."""
-        return bool(self._host.terminals.output_bits >> index_of(address, _BITS) & 1)
-
     def write_output_integer_register(self, address: int, value: Any) -> None:
         """Set an integer that clients can read."""
         if not -(2**31) <= int(value) < 2**31:
@@ -122,9 +94,8 @@ class IoFunctions:
 
     def write_output_boolean_register(self, address: int, value: Any) -> None:
         """Set a truth value that clients can read."""
-        bit = 1 << index_of(address, _BITS)
         terminals = self._host.terminals
-        terminals.output_bits = terminals.output_bits | bit if value else terminals.output_bits & ~bit
+        terminals.output_bits = with_bits(terminals.output_bits, 1 << index_of(address, _BITS), bool(value))
 
     def rtde_set_watchdog(self, variable_name: Any, min_frequency: float, action: Any = "pause") -> None:
         """Choose what happens when a client writes a variable too rarely."""
@@ -135,25 +106,7 @@ class IoFunctions:
             raise ScriptError(f"rtde_set_watchdog: an action is {', '.join(_INPUT_ACTION_NAMES)}, got {wanted[:99]!r}")
         self._host.inputs.watch(name, float(min_frequency), wanted, self._host.cycle)
 
-    # analog
-
-    def get_standard_analog_in(self, n: int) -> float:
-        """Return what is applied to an analog input [A or V]."""
-        return self._host.terminals.analog_inputs[index_of(n, 2)]
-
-    def get_tool_analog_in(self, n: int) -> float:
-        """Return what is applied to an analog input of the tool [A or V]."""
-        return self._host.terminals.analog_inputs[2 + index_of(n, 2)]
-
-    def get_analog_in(self, n: int) -> float:
-        """Return what is applied to an analog input [A or V]: 0-1 control box, 2-3 tool."""
-        return self._host.terminals.analog_inputs[index_of(n, 4)]
-
-    def get_standard_analog_out(self, n: int) -> float:
-        """Return the level of an analog output, 0..1."""
-        return self._host.terminals.ratios[index_of(n, 2)]
-
-    get_analog_out = get_standard_analog_out
+    # terminals
 
     def set_standard_analog_out(self, n: int, f: float) -> None:
         """Set the level of an analog output, 0..1."""
@@ -163,35 +116,16 @@ class IoFunctions:
 
     set_analog_out = set_standard_analog_out
 
-    def set_standard_analog_input_domain(self, port: int, domain: int) -> None:
-        """Choose what an analog input measures: 0 a current, 1 a voltage."""
-        self._host.terminals.input_domains[index_of(port, 2)] = (CURRENT, VOLTAGE)[index_of(domain, 2)]
-
-    def set_tool_analog_input_domain(self, port: int, domain: int) -> None:
-        """Choose what an analog input of the tool measures: 0 a current, 1 a voltage."""
-        self._host.terminals.input_domains[2 + index_of(port, 2)] = (CURRENT, VOLTAGE)[index_of(domain, 2)]
-
-    def set_analog_outputdomain(self, port: int, domain: int) -> None:
-        """Choose what an analog output gives: 0 a current, 1 a voltage."""
-        self._host.terminals.output_domains[index_of(port, 2)] = (CURRENT, VOLTAGE)[index_of(domain, 2)]
-
     def set_tool_voltage(self, voltage: int) -> None:
         """Set the supply of the tool: 0, 12 or 24 V."""
         if voltage not in (0, 12, 24):
             raise ScriptError(f"the supply of the tool is 0, 12 or 24 V, got {show(voltage)}")
         self._host.terminals.tool_voltage = int(voltage)
 
-    def get_flag(self, n: int) -> bool:
-        """Return a flag that the program has set."""
-        return bool(self._host.terminals.flags >> index_of(n, 32) & 1)
-
     def set_flag(self, n: int, b: Any) -> None:
         """Set a flag, which stays when the program ends."""
-        bit = 1 << index_of(n, 32)
         terminals = self._host.terminals
-        terminals.flags = terminals.flags | bit if b else terminals.flags & ~bit
-
-    # connector of the tool
+        terminals.flags = with_bits(terminals.flags, 1 << index_of(n, 32), bool(b))
 
     def set_tool_output_mode(self, mode: int) -> None:
         """Choose what the tool's digital outputs are: 0 two outputs, 1 a supply of both pins together."""
@@ -203,21 +137,68 @@ class IoFunctions:
         self._host.terminals.tool_drive_modes[index] = int(_one_of(mode, (1, 2, 3), "the mode of a tool output"))
 
 
-def _add_digital(infix: str, first: int, count: int) -> None:
-    """Add the functions of digital inputs and outputs of one kind: ``get_{infix}digital_in`` and so on."""
+def add_host_functions(functions: Mapping[str, Callable[..., Any]]) -> None:
+    """Add functions that are given the controller, and then what a program gives them."""
 
-    def get_in(self: IoFunctions, n: int) -> bool:
-        return bool(self._host.terminals.digital_inputs >> first + index_of(n, count) & 1)
+    def add(name: str, function: Callable[..., Any]) -> None:
+        def call(self: IoFunctions, *values: Any, **by_name: Any) -> Any:
+            return function(self._host, *values, **by_name)
 
-    def get_out(self: IoFunctions, n: int) -> bool:
-        return bool(self._host.digital_outputs >> first + index_of(n, count) & 1)
+        setattr(IoFunctions, name, call)
 
-    def set_out(self: IoFunctions, n: int, b: Any) -> None:
-        self._host.set_digital(1 << first + index_of(n, count), bool(b))
+    for name, function in functions.items():
+        add(name, named(name, function))
 
-    setattr(IoFunctions, f"get_{infix}digital_in", get_in)
-    setattr(IoFunctions, f"get_{infix}digital_out", get_out)
-    setattr(IoFunctions, f"set_{infix}digital_out", set_out)
+
+def _digital_functions(infix: str, first: int, count: int) -> dict[str, Callable[..., Any]]:
+    """Return the functions of digital inputs and outputs of one kind, counted from the first."""
+    return {
+        f"get_{infix}digital_in": lambda host, n: bool(host.terminals.digital_inputs >> first + index_of(n, count) & 1),
+        f"get_{infix}digital_out": lambda host, n: bool(host.digital_outputs >> first + index_of(n, count) & 1),
+        f"set_{infix}digital_out": lambda host, n, b: host.set_digital(1 << first + index_of(n, count), bool(b)),
+    }
+
+
+def _choose_domain(domains: list[int], first: int, port: Any, domain: Any) -> None:
+    """Choose what an analog terminal measures or gives: 0 a current, 1 a voltage."""
+    domains[first + index_of(port, 2)] = index_of(domain, 2)
+
+
+#: function -> what it does with the controller; analog values are in A or V, levels of outputs from 0 to 1
+_TERMINAL_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "get_rtde_value": lambda host, name: host.rtde_value(str(name)),
+    "read_input_integer_register": lambda host, address: host.inputs.read_command(index_of(address, _REGISTERS)),
+    "read_input_float_register": lambda host, address: float(
+        host.inputs[f"input_double_register_{index_of(address, _REGISTERS)}"]
+    ),
+    "read_input_boolean_register": lambda host, address: host.inputs.read_bit(index_of(address, _BITS)),
+    "read_output_integer_register": lambda host, address: host.output_ints[index_of(address, _REGISTERS)],
+    "read_output_float_register": lambda host, address: host.output_doubles[index_of(address, _REGISTERS)],
+    "read_output_boolean_register": lambda host, address: bool(
+        host.terminals.output_bits >> index_of(address, _BITS) & 1
+    ),
+    "get_flag": lambda host, n: bool(host.terminals.flags >> index_of(n, 32) & 1),
+    "get_analog_in": lambda host, n: host.terminals.analog_inputs[index_of(n, 4)],
+    "get_standard_analog_in": lambda host, n: host.terminals.analog_inputs[index_of(n, 2)],
+    "get_tool_analog_in": lambda host, n: host.terminals.analog_inputs[2 + index_of(n, 2)],
+    **dict.fromkeys(
+        ("get_standard_analog_out", "get_analog_out"), lambda host, n: host.terminals.ratios[index_of(n, 2)]
+    ),
+    "set_standard_analog_input_domain": lambda host, port, domain: _choose_domain(
+        host.terminals.input_domains, 0, port, domain
+    ),
+    "set_tool_analog_input_domain": lambda host, port, domain: _choose_domain(
+        host.terminals.input_domains, 2, port, domain
+    ),
+    "set_analog_outputdomain": lambda host, port, domain: _choose_domain(
+        host.terminals.output_domains, 0, port, domain
+    ),
+    **_digital_functions("standard_", 0, 8),
+    **_digital_functions("configurable_", 8, 8),
+    **_digital_functions("tool_", 16, 2),
+    **_digital_functions("", 0, 18),
+}
+add_host_functions(_TERMINAL_FUNCTIONS)
 
 
 def _add_absent(name: str, answer: Any) -> None:
@@ -233,9 +214,9 @@ def _add_absent(name: str, answer: Any) -> None:
 def _add_without_effect(name: str, parameters: Mapping[str, range | tuple[Any, ...] | None]) -> None:
     """Add a function that checks what it is given, and does nothing else."""
 
-    def call(_: IoFunctions, *values: Any, **named: Any) -> None:
-        given = dict(zip(parameters, values, strict=False)) | named
-        if len(values) + len(named) > len(given) or not given.keys() <= parameters.keys():
+    def call(_: IoFunctions, *values: Any, **by_name: Any) -> None:
+        given = dict(zip(parameters, values, strict=False)) | by_name
+        if len(values) + len(by_name) > len(given) or not given.keys() <= parameters.keys():
             raise ScriptError(f"{name} takes {', '.join(parameters) or 'nothing'}")
         for parameter, allowed in parameters.items():
             value = given.get(parameter)
@@ -307,8 +288,6 @@ for _name, _parameters in NO_EFFECT.items():
 for _answer, _names in _ABSENT_DEVICES:
     for _name in _names.split():
         _add_absent(_name, _answer)
-for _infix, _first, _count in (("standard_", 0, 8), ("configurable_", 8, 8), ("tool_", 16, 2), ("", 0, 18)):
-    _add_digital(_infix, _first, _count)
 
 
 def _one_of(value: Any, allowed: Container[Any], name: str) -> Any:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import socket
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import IO, Any, Protocol
 
-from coneskin.robot.sim.motion.arm import TRIGGERED, SimulatedArm, StopCause
+from coneskin.robot.arm.models import arm_model
+from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
 from coneskin.robot.sim.urscript.translator import Interpreter
 from coneskin.robot.sim.urscript.values import ScriptError
 
-from .inputs_outputs import ClientInputs, Terminals
-from .states import Notice
+from .inputs_outputs import ClientInputs, Terminals, with_bits
+from .states import Notice, Options, ProgramFailed, SafetyMode
 
 _PENDING_ERRORS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 _MAX_UNREAD = 65_536  # bytes that have come and that the program has not read; more wait in the network
@@ -113,50 +117,104 @@ class CallingProgram(Protocol):
         """Claim the arm for the thread that runs now; see `Program.drive`."""
 
 
-class ScriptHost(Protocol):
-    """Controller as a URScript function reads and commands it; see `Controller`."""
+_MAX_NOTICES = 1000  # that wait to be sent; a program that writes more in a cycle loses the oldest
+_HISTORY_LENGTH = 500  # cycles; the range of get_actual_joint_positions_history
+_REDUCED_SHARE = 0.5  # of the speed slider, in reduced mode; a real controller has limits of its own instead
 
-    cycle: int
-    arm: SimulatedArm
-    inputs: ClientInputs
-    output_ints: list[int]
-    output_doubles: list[float]
-    digital_outputs: int
-    terminals: Terminals
-    outside_time: Callable[[], float]
-    rtde_value: Callable[[str], Any]
-    beyond: bool
-    gravity: tuple[float, ...]
-    payload: float
-    payload_cog: tuple[float, ...]
-    payload_inertia: tuple[float, ...]
+
+def _no_rtde(name: str) -> Any:
+    raise ScriptError(f"{name}: this controller has no RTDE")
+
+
+def _plain(value: object) -> object:
+    return list(value) if isinstance(value, list | tuple) else str(value)
+
+
+class ScriptHost:
+    """Controller of one arm below its programs: arm, inputs and outputs, clock and log. `Controller` is the whole.
+
+    Args:
+        options: its kind.
+        log: file for a JSON line for each event.
+
+    Attributes:
+        cycle: number of control cycles since power-on.
+        safety: state of the safety system.
+        slider: share at which the speed slider stands, 0..1.
+        inputs: what clients write.
+        notices: what clients are still to be told.
+        history: measured joint positions of the last cycles, oldest first [rad].
+        outside_time: returns the time of those outside [s]; late cycles are made up for in less of it.
+        rtde_value: returns the value of an output of RTDE, which those set who know these.
+        frozen: time in which no cycle ran though its clock went on [s].
+        beyond: whether programs may connect to other computers.
+    """
+
+    def __init__(self, options: Options, log: IO[str] | None = None) -> None:
+        self.options = options
+        self.cycle = 0
+        self.arm = SimulatedArm(arm_model(options.model), options.start_q)
+        self.arm.deceleration = options.deceleration
+        self.safety = SafetyMode.NORMAL
+        self.slider = 1.0
+        self.inputs = ClientInputs(self.log, options.fieldbus)
+        self.inputs.watchdog_delay = options.watchdog_delay
+        self.output_ints = [0] * 48
+        self.output_doubles = [0.0] * 48
+        self.digital_outputs = 0
+        self.terminals = Terminals()
+        self.gravity: tuple[float, ...] = (0.0, 0.0, 9.82)
+        self.payload = 0.0
+        self.payload_cog: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self.payload_inertia: tuple[float, ...] = (0.0,) * 6
+        self.notices: deque[Notice] = deque(maxlen=_MAX_NOTICES)
+        self.history: deque[list[float]] = deque([list(self.arm.q)], maxlen=_HISTORY_LENGTH)
+        self.outside_time: Callable[[], float] = lambda: self.timestamp
+        self.rtde_value: Callable[[str], Any] = _no_rtde
+        self.frozen = 0.0
+        self.beyond = False
+        self._log = log
+
+    @property
+    def timestamp(self) -> float:
+        """Time since power-on [s]."""
+        return self.cycle * CYCLE + self.frozen
 
     @property
     def steptime(self) -> float:
-        """Control cycle [s]."""
+        """Control cycle, in which each thread of a program takes one turn [s]."""
+        return self.options.steps * CYCLE
 
     @property
     def speed_scaling(self) -> float:
-        """Share of the commanded speeds at which the arm moves, 0..1."""
-
-    @property
-    def history(self) -> Sequence[list[float]]:
-        """Joint positions of the last cycles, oldest first [rad]."""
-
-    def pause_program(self) -> bool:
-        """Hold the program and the arm."""
+        """Share of the commanded speeds at which paths run; the safety system's own stops are not in it."""
+        return self.slider * _REDUCED_SHARE if self.safety is SafetyMode.REDUCED else self.slider
 
     def set_digital(self, bit: int, on: bool) -> None:
-        """Switch digital outputs."""
+        """Switch digital outputs: bits 0-7 standard, 8-15 configurable, 16-17 tool."""
+        self.digital_outputs = with_bits(self.digital_outputs, bit, on)
+        self.log("digital", outputs=self.digital_outputs)
+
+    def tell(self, notice: Notice) -> None:
+        """Keep a notice until the server sends it to every client of the primary interface."""
+        self.notices.append(notice)
+
+    def fail(self, program: str, problem: ScriptError) -> None:
+        """Report a program that cannot be run, or that has failed."""
+        self.log("abort", program=program, reason=str(problem))
+        self.tell(ProgramFailed(problem.title, problem.line, problem.column))
+
+    def log(self, event: str, **facts: Any) -> None:
+        """Write one JSON line: cycle, controller time, this machine's monotonic clock, event and its facts."""
+        if self._log is not None:
+            now, here = round(self.timestamp, 3), time.monotonic()
+            line = {"cycle": self.cycle, "time": now, "monotonic": here, "event": event}
+            self._log.write(json.dumps(line | facts, default=_plain) + "\n")
+
+    def pause_program(self) -> bool:
+        """Hold the program and the arm; return False where no program plays."""
+        raise NotImplementedError
 
     def protective_stop(self, reason: str, cause: StopCause = TRIGGERED) -> None:
         """Stop the arm as its safety system does."""
-
-    def tell(self, notice: Notice) -> None:
-        """Tell every client of the primary interface."""
-
-    def fail(self, program: str, problem: ScriptError) -> None:
-        """Report a program that has failed."""
-
-    def log(self, event: str, **facts: Any) -> None:
-        """Write one event to the log."""
+        raise NotImplementedError

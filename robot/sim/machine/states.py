@@ -58,7 +58,7 @@ class SafetyMode(IntEnum):
 
 
 #: state -> word of RTDE's safety_status_bits
-_SAFETY_BITS = {
+SAFETY_BITS = {
     SafetyMode.NORMAL: 1 << 0,
     SafetyMode.REDUCED: 1 << 1,
     SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
@@ -73,11 +73,6 @@ _SAFETY_BITS = {
 
 #: states in which the arm may move and programs run
 MOVING = frozenset((SafetyMode.NORMAL, SafetyMode.REDUCED))
-
-
-def safety_bits(mode: SafetyMode) -> int:
-    """Return RTDE's safety_status_bits."""
-    return _SAFETY_BITS[mode]
 
 
 Version = tuple[int, int]
@@ -143,15 +138,8 @@ class Options:
         return {name: port for name, port in PORTS.items() if name not in closed}
 
 
-class Report(IntEnum):
-    """How grave an error is: the report level of the client interface."""
-
-    DEBUG = 0
-    INFO = 1
-    WARNING = 2
-    VIOLATION = 3
-    FAULT = 4
-    CRITICAL_FAULT = 5
+#: how grave an error is: report levels of the client interface
+WARNING_REPORT, FAULT_REPORT = 2, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,14 +151,7 @@ class TextNotice:
 
 @dataclass(frozen=True, slots=True)
 class PopupNotice:
-    """Window that a program's ``popup`` opens.
-
-    Attributes:
-        title: of the window.
-        text: in it.
-        warning: whether it is shown as a warning.
-        error: whether it is shown as an error.
-    """
+    """Window that a program's ``popup`` opens."""
 
     title: str
     text: str
@@ -180,12 +161,7 @@ class PopupNotice:
 
 @dataclass(frozen=True, slots=True)
 class ProgramNotice:
-    """Program that has started, or stopped.
-
-    Attributes:
-        name: of the program.
-        event: "STARTED", "STOPPED", "PAUSED" or "RESUMED".
-    """
+    """Event of a program: "STARTED", "STOPPED", "PAUSED" or "RESUMED"."""
 
     name: str
     event: str
@@ -193,13 +169,7 @@ class ProgramNotice:
 
 @dataclass(frozen=True, slots=True)
 class ProgramFailed:
-    """Program that cannot be run, or that has failed.
-
-    Attributes:
-        text: what is wrong.
-        line: of the program, from 1; 0 where it is not known.
-        column: in that line, from 1; 0 where it is not known.
-    """
+    """Program that cannot be run, or that has failed, in a line and a column from 1; 0 where these are not known."""
 
     text: str
     line: int = 0
@@ -215,18 +185,11 @@ class SafetyNotice:
 
 @dataclass(frozen=True, slots=True)
 class ErrorNotice:
-    """Entry of the controller's log, such as C153A0.
-
-    Attributes:
-        code: number after the C.
-        argument: number after the A.
-        report: how grave it is.
-        text: what happened.
-    """
+    """Entry of the controller's log: C153A0 has the code 153 and the argument 0."""
 
     code: int
     argument: int
-    report: Report
+    report: int
     text: str = ""
 
 

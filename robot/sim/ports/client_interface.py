@@ -24,12 +24,12 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import (
     MOVING,
+    WARNING_REPORT,
     ErrorNotice,
     Notice,
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
-    Report,
     RobotMode,
     SafetyMode,
     SafetyNotice,
@@ -296,7 +296,7 @@ class ScriptPort:
         """
         if self._opened_local or not self._controller.remote_control:
             self._controller.log("dropped", reason="local control")
-            notice = ErrorNotice(_READ_ONLY, 0, Report.WARNING, "The connection is read-only")
+            notice = ErrorNotice(_READ_ONLY, 0, WARNING_REPORT, "The connection is read-only")
             return _encode_notice(self._controller.timestamp, notice) if self._messages else b""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))
         if len(self._rest) > MAX_LENGTH:

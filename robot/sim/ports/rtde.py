@@ -19,7 +19,7 @@ from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
-from coneskin.robot.sim.machine.states import MOVING, RobotMode, Runtime, Version, safety_bits
+from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, RobotMode, Runtime, Version
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import (
@@ -104,7 +104,7 @@ class RtdeOutputs:
             "safety_mode": lambda: int(c.safety),
             "safety_status": lambda: int(c.safety),
             "robot_status_bits": lambda: _robot_bits(c.robot_mode, c.runtime is Runtime.PLAYING),
-            "safety_status_bits": lambda: safety_bits(c.safety),
+            "safety_status_bits": lambda: SAFETY_BITS[c.safety],
             "speed_scaling": lambda: c.speed_scaling if c.safety in MOVING else 0.0,
             "target_speed_fraction": lambda: c.slider,
             "actual_digital_output_bits": lambda: c.digital_outputs,

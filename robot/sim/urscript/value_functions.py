@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import random
 import re
+from collections.abc import Callable
 from typing import Any
 
 from coneskin.geometry.pose import Pose
@@ -29,32 +30,15 @@ from .values import (
 
 
 class ValueFunctions:
-    """URScript functions of poses, lists, numbers and texts; places in a text are counted from 0."""
+    """URScript functions of poses, lists, numbers and texts; places in a text are counted from 0.
 
-    _random = random.Random(0)
-
-    def pose_trans(self, first: Any, second: Any) -> PoseValue:
-        """Return one pose after another."""
-        return values_of(pose_of(first) @ pose_of(second))
-
-    def pose_inv(self, pose: Any) -> PoseValue:
-        """Return the inverse of a pose."""
-        return values_of(pose_of(pose).inverse())
-
-    def pose_add(self, first: Any, second: Any) -> PoseValue:
-        """Add positions, and turn by one rotation after the other, both in the base frame."""
-        turn = Pose.from_rotation_vector(first[3:]) @ Pose.from_rotation_vector(second[3:])
-        return PoseValue((*(a + b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
-
-    def pose_sub(self, first: Any, second: Any) -> PoseValue:
-        """Subtract positions, and return the rotation from the second to the first, in the base frame."""
-        turn = Pose.from_rotation_vector(first[3:]) @ Pose.from_rotation_vector(second[3:]).inverse()
-        return PoseValue((*(a - b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
+    Those of one expression are in `_EXPRESSIONS`.
+    """
 
     def inv(self, m: Any) -> Any:
         """Return the inverse of a pose or of a matrix."""
         if isinstance(m, PoseValue):
-            return self.pose_inv(m)
+            return values_of(pose_of(m).inverse())
         if not is_matrix(m) or any(len(row) != len(m) for row in m):
             raise ScriptError(f"inv takes a pose or a square matrix, got {show(m)}")
         units = [[float(i == j) for j in range(len(m))] for i in range(len(m))]
@@ -68,24 +52,6 @@ class ValueFunctions:
         if not all(isinstance(row, list) for row in m):
             raise ScriptError(f"transpose takes a list of lists, got {show(m)}")
         return Array(map(Array, zip(*m, strict=True)))
-
-    def norm(self, values: Any) -> float:
-        """Return the Euclidean length."""
-        return math.hypot(*values) if isinstance(values, list) else abs(values)
-
-    def length(self, values: Any) -> int:
-        """Return the number of elements."""
-        return len(values)
-
-    get_list_length = size = length
-
-    def point_dist(self, p_from: Any, p_to: Any) -> float:
-        """Return the distance of two positions [m]."""
-        return math.dist(p_from[:3], p_to[:3])
-
-    def pose_dist(self, p_from: Any, p_to: Any) -> float:
-        """Return the length of the difference of two poses, positions [m] and rotation vector [rad] together."""
-        return math.hypot(*self.pose_sub(p_to, p_from))
 
     def interpolate_pose(self, p_from: Any, p_to: Any, alpha: float) -> PoseValue:
         """Return a pose on the straight path between two, turning about one axis; alpha is 0 at the first."""
@@ -103,18 +69,6 @@ class ValueFunctions:
         torque = [a + b for a, b in zip(wrench[3:], about, strict=True)]
         return Array((*back.rotate((fx, fy, fz)), *back.rotate((torque[0], torque[1], torque[2]))))
 
-    def rotvec2rpy(self, rotation_vector: Any) -> Array:
-        """Return roll, pitch and yaw [rad] of a rotation vector: about x, then y, then z, all fixed axes."""
-        return Array(Pose.from_rotation_vector(rotation_vector).rpy)
-
-    def rpy2rotvec(self, rpy_vector: Any) -> Array:
-        """Return the rotation vector [rad] of roll, pitch and yaw."""
-        return Array(Pose.from_xyz_rpy(rpy=rpy_vector).rotation_vector)
-
-    def normalize(self, v: Any) -> Array:
-        """Return a list of the same direction and of length 1."""
-        return Array(value / math.hypot(*v) for value in v)
-
     def binary_list_to_integer(self, l: Any) -> int:  # noqa: E741 (its name in URScript)
         """Return the number of which a list has the bits, the lowest first."""
         if len(l) > 32:
@@ -122,31 +76,11 @@ class ValueFunctions:
         value = sum(1 << place for place, bit in enumerate(l) if bit)
         return value - (1 << 32) if value >= 1 << 31 else value
 
-    def integer_to_binary_list(self, x: int) -> Array:
-        """Return the 32 bits of a whole number, the lowest first."""
-        return Array(bool(int(x) >> place & 1) for place in range(32))
-
     def make_list(self, length: int, initial_value: Any, capacity: int = 0) -> Array:
         """Return a list of a value, which may grow to a capacity."""
         if not 0 <= int(length) <= MAX_ITEMS or int(capacity) > MAX_ITEMS:
             raise ScriptError(f"a list has at most {MAX_ITEMS} elements, got {show(length)} and {show(capacity)}")
         return make_list([initial_value] * int(length), max(int(length), int(capacity)))
-
-    def log(self, b: float, n: float) -> float:
-        """Return the logarithm of n to the base b."""
-        return math.log(n) / math.log(b)
-
-    def random(self) -> float:
-        """Return a number from 0 to 1; each controller has the same sequence."""
-        return self._random.random()
-
-    def d2r(self, degrees: float) -> float:
-        """Convert degrees to radians."""
-        return math.radians(degrees)
-
-    def r2d(self, radians: float) -> float:
-        """Convert radians to degrees."""
-        return math.degrees(radians)
 
     def str_at(self, src: Any, index: int) -> str:
         """Return the character at a place."""
@@ -159,19 +93,6 @@ class ValueFunctions:
         if len(text) > MAX_LINE:
             raise ScriptError(f"str_cat makes at most {MAX_LINE} characters, got {len(text)}")
         return text
-
-    def str_empty(self, str: Any) -> bool:
-        """Return whether a text is empty."""
-        return not _text(str)
-
-    def str_find(self, src: Any, target: Any, start_from: int = 0) -> int:
-        """Return the first place of one text in another; -1 without one."""
-        text = _text(src)
-        return text.find(_text(target), _place(start_from, len(text)))
-
-    def str_len(self, str: Any) -> int:
-        """Return the number of characters."""
-        return len(_text(str))
 
     def str_sub(self, src: Any, index: int, len: int | None = None) -> str:
         """Return a part of a text."""
@@ -188,13 +109,57 @@ class ValueFunctions:
         whole = text.lstrip("+-").isdigit() and abs(number) < 2**31
         return int(number) if whole else number
 
-    def to_str(self, val: Any) -> str:
-        """Return a value as text."""
-        return text_of(val)
+
+def _turn(pose: Any) -> Pose:
+    return Pose.from_rotation_vector(pose[3:])
 
 
-for _name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "floor", "ceil", "pow"):
-    setattr(ValueFunctions, _name, staticmethod(getattr(math, _name)))
+def _moved(first: Any, second: Any, sign: int, turn: Pose) -> PoseValue:
+    """Return a position moved by another, or back by it, with a rotation."""
+    return PoseValue((*(a + sign * b for a, b in zip(first[:3], second[:3], strict=True)), *turn.rotation_vector))
+
+
+def _pose_sub(first: Any, second: Any) -> PoseValue:
+    return _moved(first, second, -1, _turn(first) @ _turn(second).inverse())
+
+
+#: function of one expression -> what it returns
+_EXPRESSIONS: dict[str, Callable[..., Any]] = {
+    **{name: getattr(math, name) for name in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "atan2")},
+    **{name: getattr(math, name) for name in ("floor", "ceil", "pow")},
+    "d2r": lambda degrees: math.radians(degrees),
+    "r2d": lambda radians: math.degrees(radians),
+    "log": lambda b, n: math.log(n) / math.log(b),
+    "random": random.Random(0).random,  # each controller has the same sequence
+    # both rotations of pose_add and pose_sub are in the base frame
+    "pose_add": lambda first, second: _moved(first, second, 1, _turn(first) @ _turn(second)),
+    "pose_sub": _pose_sub,
+    "pose_dist": lambda p_from, p_to: math.hypot(*_pose_sub(p_to, p_from)),  # rotation vector [rad] and all
+    "pose_trans": lambda first, second: values_of(pose_of(first) @ pose_of(second)),
+    "pose_inv": lambda pose: values_of(pose_of(pose).inverse()),
+    "point_dist": lambda p_from, p_to: math.dist(p_from[:3], p_to[:3]),
+    "rotvec2rpy": lambda rotation_vector: Array(Pose.from_rotation_vector(rotation_vector).rpy),
+    "rpy2rotvec": lambda rpy_vector: Array(Pose.from_xyz_rpy(rpy=rpy_vector).rotation_vector),
+    **dict.fromkeys(("length", "get_list_length", "size"), lambda values: len(values)),
+    "norm": lambda values: math.hypot(*values) if isinstance(values, list) else abs(values),
+    "normalize": lambda v: Array(value / math.hypot(*v) for value in v),
+    "integer_to_binary_list": lambda x: Array(bool(int(x) >> place & 1) for place in range(32)),
+    "str_empty": lambda str: not _text(str),
+    "str_find": lambda src, target, start_from=0: _text(src).find(_text(target), _place(start_from, len(_text(src)))),
+    "str_len": lambda str: len(_text(str)),
+    "to_str": lambda val: text_of(val),
+}
+
+
+def named(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a function without a name the one by which a program calls it, and by which its errors call it."""
+    if getattr(function, "__name__", "") == "<lambda>":
+        function.__qualname__ = function.__name__ = name
+    return function
+
+
+for _name, _function in _EXPRESSIONS.items():
+    setattr(ValueFunctions, _name, staticmethod(named(_name, _function)))
 
 
 MAX_LINE = 1023  #: characters that str_cat and to_str make

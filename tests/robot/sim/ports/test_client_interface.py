@@ -14,7 +14,6 @@ from coneskin.robot.sim.machine.states import (
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
-    Report,
     SafetyMode,
     SafetyNotice,
     TextNotice,
@@ -62,7 +61,7 @@ def test_the_version_is_laid_out_as_the_recorded_one():
 
 
 def test_an_error_has_its_code_and_its_gravity():
-    made = _encode_notice(1.5, ErrorNotice(153, 2, Report.VIOLATION, "text"))
+    made = _encode_notice(1.5, ErrorNotice(153, 2, 3, "text"))
     assert struct.unpack(">iBQBBiiiII", made[:35]) == (39, 20, 1_500_000, 253, 6, 153, 2, 3, 0, 0)
     assert made[35:] == b"text"
 
@@ -97,7 +96,7 @@ def test_half_a_pair_of_surrogates_ends_no_controller():
     assert _encode_notice(0.0, TextNotice(f"a{half}b")).endswith(b"a?b")
     for notice in (PopupNotice(half, half), ProgramNotice(half, "STARTED"), ProgramFailed(half, 1, 1)):
         assert _encode_notice(0.0, notice).endswith(b"?")
-    assert _encode_notice(0.0, ErrorNotice(209, 0, Report.WARNING, half)).endswith(b"?")
+    assert _encode_notice(0.0, ErrorNotice(209, 0, 2, half)).endswith(b"?")
 
 
 #: kind of a sub-package -> its size, in the packet of 1386 bytes recorded from URSim 5.24 with a UR5e
@@ -139,7 +138,7 @@ def test_kinematics_and_configuration_come_once():
 
 def test_it_says_where_the_arm_is_and_what_it_does():
     controller = Controller(Options(model="ur5e", start_q=Q))
-    controller.safety_system.mode, controller.slider = SafetyMode.PROTECTIVE_STOP, 0.5
+    controller.safety, controller.slider = SafetyMode.PROTECTIVE_STOP, 0.5
     controller.update()
     state = sub_packages(_encode_state(controller))
     joints = [struct.unpack(">dddffffB", state[1][41 * i : 41 * i + 41]) for i in range(6)]
