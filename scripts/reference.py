@@ -271,16 +271,20 @@ def proof_table() -> str:
 
 def liveness_table() -> str:
     """Return the table of who misses whom."""
-    from coneskin.robot.driver.liveness import LIVENESS
+    from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE, UNGUARDED_TIME
 
-    def limit(value: float | str) -> str:
-        return f"{value:g} s" if isinstance(value, float) else f"`{value}`"
-
-    rows = [f"| {row.who} | {row.heard_by} | {row.sign} | {limit(row.limit)} | {row.follows} |" for row in LIVENESS]
-    return (
-        "\n".join(["| silent | missed by | sign of life | limit | who misses it |", "|---|---|---|---|---|", *rows])
-        + "\n"
-    )
+    guard, alone, moved = (f"{limit:g} s" for limit in (GUARD_SILENCE, UNGUARDED_TIME, SETPOINT_SILENCE))
+    return f"""\
+| silent | missed by | sign of life | limit | who misses it |
+|---|---|---|---|---|
+| your program | guard | it is not suspended | `program_silence_ms` | stops the arm, latches |
+| driver process, watchdogs | guard | heartbeat | `4/3 program_silence_ms` | stops the arm by another path, latches |
+| guard | driver process, first watchdog | heartbeat | {guard} | stops the arm |
+| guard | second watchdog | heartbeat | {alone} | stops the arm, holds it |
+| guard | your program | its reports | {alone} | raises RobotConnectionError |
+| guard that moves the arm | driver process | setpoints | {moved} | stops the arm |
+| driver process | controller | writes | `1 / watchdog_hz` | ends its program |
+"""
 
 
 #: page -> name of a generated part -> what makes it

@@ -36,7 +36,7 @@ LOADED = "coneskin.geometry.frustum", "coneskin.skin.sensor"
 _LOAD = "from coneskin.scene.reader import load_scene; scene = load_scene({scene!r})"
 _BUILD = _LOAD + "; from coneskin.scene.build import build_core; build_core(scene)"
 _BUILD_COMMISSIONED = (
-    _LOAD + "; from coneskin.testing.scenes import commissioned"
+    _LOAD + "; from tests.support.scenes import commissioned"
     "; from coneskin.scene.build import build_core; build_core(commissioned(scene))"
 )
 _SERIAL_FREE = SKIN_ONLY[: SKIN_ONLY.index("[source]")]

@@ -39,8 +39,8 @@ from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reactio
 from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
-from coneskin.testing.scenes import commissioned
 from tests.support.bare_parts import bare_parts_of
+from tests.support.scenes import commissioned
 
 from .cases import ARM_MODELS, RUN_UP, RUN_UP_ACCELERATION, SPEED_RANGE, STIFFNESS_RANGE, scene_text
 

@@ -14,7 +14,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.scene.build import SensorOnArm, place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
-from coneskin.testing.scenes import commissioned
+from tests.support.scenes import commissioned
 
 ARM_MODELS = ("UR5e", "UR10e", "UR3e")
 SPEED_RANGE = 0.1, 1.5  # m/s of the touched place along its normal

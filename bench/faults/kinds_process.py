@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from coneskin.robot.driver.liveness import GUARD_SILENCE
-from coneskin.testing.scenes import ESCALATE
+from tests.support.scenes import ESCALATE
 
 from .kind import (
     BOTH,

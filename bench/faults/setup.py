@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coneskin.testing.scenes import ESCALATE, start_with
+from tests.support.scenes import ESCALATE, start_with
 
 GOAL = start_with(140.0)
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0

@@ -26,7 +26,7 @@ from typing import Any, ClassVar
 from coneskin.core.errors import ConeSkinError, RobotConnectionError
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import load_scene
-from coneskin.testing.scenes import START, forearm_scene, write_passed_record
+from tests.support.scenes import START, forearm_scene, write_passed_record
 
 from .motion import BEHIND, ArmMotion, Touch
 from .setup import ACCELERATION, CLOCK, GOAL, MONITORING_TABLE, SECOND_SKIN, SPEED, USUAL_SETUP, Setup, give_precedence

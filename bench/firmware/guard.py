@@ -25,10 +25,10 @@ from coneskin.runs.replay.run import read_run
 from coneskin.runs.replay.run_picture import draw_run
 from coneskin.session.session import guard
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.scenes import GOAL, START
 from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard, sheets_at_touch
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 from tests.support.firmware.guarded_board import board_scene
+from tests.support.scenes import GOAL, START
 
 STAGE_NAMES = ("frame", "stop written", "slower", "standstill")
 

@@ -17,7 +17,7 @@ from bench.report import head, show
 from coneskin.impact.permissible_speed.arm_patches import motion_positions, patches_of, weigh
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 MOTIONS = {
     "base turns 70 deg": "[[-10, -90, 90, -90, -90, 0], [60, -90, 90, -90, -90, 0]]",

@@ -34,7 +34,7 @@ from coneskin.core.errors import Collision, ConeSkinError
 from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.session.session import guard
-from coneskin.testing.scenes import ESCALATE, START, forearm_scene, start_with
+from tests.support.scenes import ESCALATE, START, forearm_scene, start_with
 
 SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 BUDGET = SPEED / DECELERATION + 4.0 * ESCALATE + 0.02  # s; from a touch to the arm that stands

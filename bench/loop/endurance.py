@@ -38,7 +38,7 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, encode
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 RATE_HZ = 1000
 QUIET, SCRIPTS, TOUCHED = 5000, 50, 150  # frames of each

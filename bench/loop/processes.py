@@ -32,7 +32,7 @@ from coneskin.core.version import code_build
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 from .compiled import TREES, paths
 from .far_end import FarEnd

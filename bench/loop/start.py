@@ -26,7 +26,7 @@ from typing import Any
 
 from bench.report import head, show
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 from .processes import PATIENT_LIMITS
 from .timeline import environment, legend, picture, spans

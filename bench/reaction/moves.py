@@ -21,7 +21,7 @@ from typing import Any
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.session.session import Session
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 MODES = ("moveJ", "moveL", "speedJ", "servoJ", "sync", "script")
 EXTERNAL_MODES = ("sync", "script", "urcl")

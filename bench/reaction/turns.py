@@ -25,7 +25,7 @@ from coneskin.robot.ur.rtde_connection import StateReader
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
-from coneskin.testing.scenes import START, forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 from .moves import CLOCK, EXTERNAL_MODES, Child, ExternalArm, GuardedArm
 

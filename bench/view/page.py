@@ -30,7 +30,7 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import Session, guard
-from coneskin.testing.scenes import START, forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 from .browser import PROCESS_KINDS, drawn_pictures, first_picture, resident
 from .guard import guard_rounds, print_lateness

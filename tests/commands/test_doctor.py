@@ -14,8 +14,8 @@ from coneskin.commissioning.examination.wires import WirePatch
 from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene
-from coneskin.testing.scenes import forearm_scene
 from tests.support.paths import SHARED_DATA
+from tests.support.scenes import forearm_scene
 
 from ..scene.scenes import SKIN_ONLY
 

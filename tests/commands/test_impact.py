@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -10,7 +10,7 @@ import pytest
 from coneskin.cli import main
 from coneskin.commands import permissible
 from coneskin.impact.permissible_speed import speed_map
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"
 LIMITS = """\

@@ -11,7 +11,7 @@ from coneskin.commands.simulated_arm import simulated_arm
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.sim import process
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from coneskin.scene.reader import parse_scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FrameDecoder, encode
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 SCENE = parse_scene(forearm_scene())
 SENSOR = SCENE.sensors[0].sensor

@@ -19,7 +19,7 @@ from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantState
 from coneskin.robot.sim.motion.remote_plant import RemotePlant, decode_targets, encode_state
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
-from coneskin.testing.scenes import START, forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 QD = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 

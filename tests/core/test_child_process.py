@@ -14,7 +14,7 @@ from coneskin.core import child_process as module
 from coneskin.core.channel import Channel, encode_json, pair, wait_readable
 from coneskin.core.child_process import Lifeline, spawn
 from coneskin.core.errors import RobotConnectionError
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 
 def test_a_child_gets_its_end(tmp_path, monkeypatch):

@@ -23,7 +23,7 @@ from coneskin.robot.reaction.types import ContactOnLink
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START, commissioned, forearm_scene
+from tests.support.scenes import START, commissioned, forearm_scene
 
 DEADLINE = 60.0  # s for whatever has to happen; a busy computer takes its time
 FAR = [math.radians(300.0), *START[1:]]  # a goal that takes 6 s, longer than any silence that a scene here lets be

@@ -12,7 +12,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.sim.urscript.values import values_of
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, await_message, is_reset, scene_for, until
 

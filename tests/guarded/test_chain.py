@@ -16,7 +16,7 @@ from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, 
 from coneskin.runs.replay.run import read_run
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import (
     DEADLINE,

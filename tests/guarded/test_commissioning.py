@@ -5,7 +5,7 @@ import pytest
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START, commissioned
+from tests.support.scenes import START, commissioned
 
 from .guarded_session import DEADLINE, run_until_moving, scene_text, until_undisturbed
 

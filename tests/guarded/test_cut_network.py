@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.robot.ur.input_writers import heartbeat_lines
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, FAR, assert_stopped_on_the_way, await_message, fast, refusal, scene_for, until
 

@@ -10,10 +10,10 @@ import pytest
 from coneskin.core.errors import Collision, RobotRefused
 from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
 from tests.support.firmware.emulated_board import BoardPrograms, EmulatedBoard
 from tests.support.firmware.firmware_build import build_emulator, build_sketch, missing_tools
 from tests.support.firmware.guarded_board import board_scene
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, assert_stopped_on_the_way, fast, moving, run_until_moving, until
 

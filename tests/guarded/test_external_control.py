@@ -19,7 +19,7 @@ import pytest
 from coneskin.core.errors import Collision, RobotRefused
 from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 from tests.support.sweep import sweep
 
 from .guarded_session import (

@@ -14,7 +14,7 @@ from coneskin.core import child_process
 from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused
 from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
-from coneskin.testing.scenes import GOAL, START
+from tests.support.scenes import GOAL, START
 
 from ..robot import wheel
 from .guarded_session import (

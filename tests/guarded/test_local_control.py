@@ -6,7 +6,7 @@ import pytest
 
 from coneskin.core.errors import RobotRefused
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, fast, scene_for, until
 

@@ -14,7 +14,7 @@ import pytest
 from coneskin.core.errors import RobotRefused
 from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
-from coneskin.testing.scenes import GOAL, START
+from tests.support.scenes import GOAL, START
 
 from .guarded_session import (
     DEADLINE,

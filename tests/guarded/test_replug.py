@@ -12,7 +12,7 @@ from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 from coneskin.skin.virtual.pseudo_terminal import PseudoTerminal
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.testing.scenes import START, commissioned, forearm_scene
+from tests.support.scenes import START, commissioned, forearm_scene
 
 from .guarded_session import (
     DEADLINE,

@@ -8,7 +8,7 @@ import pytest
 from coneskin.core.errors import Collision
 from coneskin.runs.replay.run import read_run
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, run_until_moving, scene_for, until_undisturbed
 

@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.core.errors import Collision
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import FAR, kill, scene_for, until
 

@@ -7,7 +7,7 @@ import tomli_w
 
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 from tests.support.speed_limit_values import limit_values
 
 from .guarded_session import DEADLINE, FAR, kill, moving, scene_text, until

@@ -10,7 +10,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.model_check import read_pose
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import scene_for
 

@@ -14,7 +14,7 @@ from coneskin.core.errors import RobotConnectionError, SensorError
 from coneskin.robot.driver.messages import LEAVE, Heartbeat
 from coneskin.session.child_processes import ChildProcesses
 from coneskin.session.session import guard
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 from .guarded_session import DEADLINE, fast, is_reset, kill, scene_for, until
 

@@ -12,7 +12,7 @@ import pytest
 from coneskin.robot.arm.kinematics import forward
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.ur.rtde_connection import StateReader
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 pytestmark = pytest.mark.long
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")

@@ -4,7 +4,7 @@ import pytest
 
 from coneskin.core.errors import SceneError
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 
 def scene(wraps: list[float], turns: list[float], more: str = "") -> str:

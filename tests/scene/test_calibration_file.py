@@ -26,7 +26,7 @@ from coneskin.scene.values.calibration_file import (
     add_calibration,
     sensor_fingerprint,
 )
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 PLAIN = forearm_scene(reaction='kind = "retreat"').replace(
     "[[link.sensor]]", '[[link.sensor]]\nname = "skin"\ndevice = 7'

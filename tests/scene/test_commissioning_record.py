@@ -21,7 +21,7 @@ from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.summary import summarize
 from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
-from coneskin.testing.scenes import commissioned, write_passed_record
+from tests.support.scenes import commissioned, write_passed_record
 
 from .scenes import SERIAL_RETREAT, SKIN_ONLY, inputs
 

@@ -19,7 +19,7 @@ from coneskin.scene.build import _speed_limit, build_core, place_on_arm
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.tables.speed_limit_tables import limit_fingerprint
 from coneskin.scene.values.scene import LimitedPatch, Scene, SpeedLimitScene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 from tests.support.speed_limit_values import limit_values
 
 SCENE = forearm_scene() + "[padding]\nthickness_mm = 6\nstiffness_n_per_mm = 10\n"

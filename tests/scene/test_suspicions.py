@@ -12,7 +12,7 @@ from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.suspicions import suspicions
 from coneskin.session.session import guard
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 from .scenes import DOCUMENT
 

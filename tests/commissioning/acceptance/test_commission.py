@@ -11,7 +11,7 @@ from coneskin.commissioning.skin_watch import TouchSession
 from coneskin.core.errors import SkinConnectionError
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 TEXT = forearm_scene(reaction='kind = "retreat"').replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"')
 Output = pytest.CaptureFixture[str]

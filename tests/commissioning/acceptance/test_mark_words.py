@@ -18,7 +18,7 @@ from coneskin.robot.arm.kinematics import dh_mesh, link_pose, link_poses
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.scenes import START, forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 UR5E = arm_model("UR5e")
 #: of the sheet on the link; the second lies end for end

@@ -12,7 +12,7 @@ from coneskin.commissioning.touching import Notice, Touching
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.skin.detection.frame.reading import TouchReading
-from coneskin.testing.scenes import START, forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 STEP = 0.01  # s
 TWO = 'id = 2\nname = "two"\nradius1_mm = 37\nradius2_mm = 37\nheight_mm = 100\nxyz_mm = [0, 0, 300]\n'

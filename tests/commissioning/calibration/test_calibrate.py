@@ -11,7 +11,7 @@ from coneskin.cli import main
 from coneskin.commands.calibrate import _forces
 from coneskin.scene.reader import load_scene
 from coneskin.scene.values.calibration_file import _read_calibrations
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 TEXT = forearm_scene().replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"\nwrap_deg = 350\ndevice = 7')
 NAMED = TEXT.replace("device = 7", 'device = 7\ncalibration = "own"')

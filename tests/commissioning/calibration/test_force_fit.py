@@ -13,7 +13,7 @@ from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.calibration import ForceTable
 from coneskin.skin.detection.frame.reading import TouchReading
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 FORCES = (1.0, 2.0, 5.0, 10.0)
 TABLE = "forces_n = [1, 2, 5, 10]\nforce_levels = [0.3, 0.5, 0.7, 0.8]\nforce_error = 0.12\n"

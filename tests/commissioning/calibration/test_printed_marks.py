@@ -12,7 +12,7 @@ from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 TUBE = Frustum(0.0375, 0.0375, 0.24, math.radians(350))
 Output = pytest.CaptureFixture[str]

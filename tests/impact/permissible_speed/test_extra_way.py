@@ -26,7 +26,7 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.materials import Padding
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 MODEL = arm_model("UR5e")
 TURN = 2.0 * math.pi * 15.0

@@ -13,7 +13,7 @@ from coneskin.impact.permissible_speed.speed_map import map_speeds
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
-from coneskin.testing.scenes import forearm_scene
+from tests.support.scenes import forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -28,8 +28,8 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.tables.speed_limit_tables import limit_fingerprint
 from coneskin.skin.materials import Padding
-from coneskin.testing.scenes import forearm_scene
 from tests.support.effective_mass import effective_mass
+from tests.support.scenes import forearm_scene
 
 from .test_limits_file import TEXT
 

@@ -14,8 +14,8 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
-from coneskin.testing.scenes import commissioned, forearm_scene
 from tests.support.bare_parts import bare_parts_of
+from tests.support.scenes import commissioned, forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -14,7 +14,7 @@ from coneskin.runs.replay.run import read_run
 from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
-from coneskin.testing.scenes import commissioned, forearm_scene
+from tests.support.scenes import commissioned, forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -24,8 +24,8 @@ from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.session.session import guard
-from coneskin.testing.scenes import forearm_scene, start_with
 from tests.guarded.guarded_session import until
+from tests.support.scenes import forearm_scene, start_with
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")

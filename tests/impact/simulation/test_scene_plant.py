@@ -12,7 +12,7 @@ from coneskin.robot.sim.motion.plant import PlantLost
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
 from coneskin.skin.materials import Padding
-from coneskin.testing.scenes import forearm_scene, start_with
+from tests.support.scenes import forearm_scene, start_with
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 

@@ -7,7 +7,7 @@ import pytest
 from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.ur.program_io import RtdeVariableReader
-from coneskin.testing.scenes import START
+from tests.support.scenes import START
 
 pytestmark = pytest.mark.long
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
-from coneskin.testing.scenes import commissioned, forearm_scene
+from tests.support.scenes import commissioned, forearm_scene
 
 # what the board's page says of an Uno: its bits, the resistance of its switches, its rate on the line
 _SENSOR = "adc_bits = 11\nlead_ohm = 3"

@@ -14,11 +14,11 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
-from coneskin.testing.scenes import forearm_scene
 from coneskin.view.stage.level_scale import level_colour
 from coneskin.view.stage.solids import Solid, arm_solids, barrel, joined
 from coneskin.view.stage.stage import CLEAR, Stage, _clear_where_buried, floor_lines, set_stage
 from tests.scene.scenes import DOUBLE_CONE
+from tests.support.scenes import forearm_scene
 
 POSES = ((0.0, -1.57, 1.2, -1.2, -1.57, 0.0), (0.4, -0.9, -1.1, 2.0, 1.0, 0.5))
 
