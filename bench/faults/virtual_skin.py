@@ -25,11 +25,11 @@ from typing import Any
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.command import parse_fault
 from coneskin.skin.virtual.fault_injection import FaultInjection, FaultyLine
 from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, wait_for_reader, write_all
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.virtual.typed_script import parse_fault
 
 from .setup import give_precedence
 

@@ -13,11 +13,15 @@ def board_page(circuit: BoardCircuit) -> str:
     parts = sensor.electronics
     count, volt = parts.full_count, parts.full_count / parts.adc_volts
     zero, bias = parts.count_amperes(0.0), 50.0 * parts.current_zero * circuit.shunt_ohms
+    rate, remark = facts.rate, f"{facts.remark[:1].upper()}{facts.remark[1:]}. "
+    if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
+        chips = f"two {other.name.upper()} in place of its converter"
+        rate, remark = f"{other.rate_hz}, measured in emulation on an Uno, with {chips}", ""
     lines = [
         f"# {facts.title} for {sensor.name}",
         "",
         f"Drawing: wiring.svg. Parts, prices, second sources: parts.csv. For a layout in KiCad: board.net. "
-        f"{_remark(circuit)}Frames per second: {_rate(circuit)}. This is no safety-rated device.",
+        f"{remark}Frames per second: {rate}. This is no safety-rated device.",
         "",
         f"Drive currents: {1e3 * sensor.radial_amperes:.3g} mA from {_ends(sensor.b_positive, 'B', 'A')}, "
         f"{1e3 * sensor.angular_amperes:.3g} mA from {_ends(sensor.c_positive, 'C', 'D')}; full scale "
@@ -70,19 +74,6 @@ def board_page(circuit: BoardCircuit) -> str:
             "",
         ]
     return "\n".join(lines)
-
-
-def _remark(circuit: BoardCircuit) -> str:
-    """Return the remark of the board; those of its own converter do not matter beside another one."""
-    remark = circuit.facts.remark if circuit.converter is None else ""
-    return f"{remark[0].upper()}{remark[1:]}. " if remark else ""
-
-
-def _rate(circuit: BoardCircuit) -> str:
-    other = circuit.converter
-    if other is None:
-        return circuit.facts.rate
-    return f"{other.rate_hz}, measured in emulation on an Uno, with two {other.name.upper()} in place of its converter"
 
 
 def _ends(normal: bool, first: str, second: str) -> str:

@@ -26,51 +26,22 @@ class BoardFacts(NamedTuple):
 #: Board, as the sketch's table names it -> its facts.
 BOARD_FACTS: dict[str, BoardFacts] = {
     "uno": BoardFacts(
-        "Arduino Uno R3 or Nano",
-        "arduino:avr:uno",
-        5.0,
-        "5V",
-        5000,
-        "200, measured in emulation",
+        *("Arduino Uno R3 or Nano", "arduino:avr:uno", 5.0, "5V", 5000, "200, measured in emulation"),
         "wire 3.3 V to AREF; its clock is a ceramic resonator",
     ),
     "nano-every": BoardFacts(
-        "Arduino Nano Every",
-        "arduino:megaavr:nona4809",
-        5.0,
-        "5V",
-        30_000,
-        "200, an estimate",
+        *("Arduino Nano Every", "arduino:megaavr:nona4809", 5.0, "5V", 30_000, "200, an estimate"),
         "wire 3.3 V to AREF; its clock is the controller's own oscillator",
     ),
     "pico": BoardFacts(
-        "Raspberry Pi Pico",
-        "rp2040:rp2040:rpipico",
-        3.3,
-        "VBUS",
-        100,
-        "200, at most about 500: an estimate",
+        *("Raspberry Pi Pico", "rp2040:rp2040:rpipico", 3.3, "VBUS", 100, "200, at most about 500: an estimate"),
         "has three channels: an analog multiplexer brings the six to one of them",
     ),
     "teensy": BoardFacts(
-        "Teensy 4.0",
-        "teensy:avr:teensy40",
-        3.3,
-        "VIN",
-        100,
-        "200, at most 1000: an estimate",
+        *("Teensy 4.0", "teensy:avr:teensy40", 3.3, "VIN", 100, "200, at most 1000: an estimate"),
         "its pins do not stand more than 3.3 V",
     ),
-    "esp32": BoardFacts(
-        "ESP32 DevKit",
-        "esp32:esp32:esp32",
-        3.3,
-        "VIN",
-        100,
-        "40, an estimate",
-        "",
-        own_converter=False,
-    ),
+    "esp32": BoardFacts("ESP32 DevKit", "esp32:esp32:esp32", 3.3, "VIN", 100, "40, an estimate", "", False),
 }
 
 

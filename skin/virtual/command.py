@@ -12,24 +12,22 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from coneskin.core.errors import SensorError, SkinConnectionError
-from coneskin.core.files import explain_os_error
+from coneskin.core.files import explain_os_error, read_file
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS
 
-from . import typed_script
-from .circuit import ContactModel
+from .circuit import ContactModel, WiringFaults
 from .fault_injection import FaultInjection
 from .imperfections import Imperfections
-from .scripted_touch import ScriptedTouch
+from .scripted_touch import TOUCH_SHAPES, ScriptedTouch
 from .skin import MODELS, VirtualSkin
-from .typed_script import FAULT_NAMES, FLAW_NAMES, TOUCH_SHAPES, parse_fault, parse_flaw, parse_press, read_script
 
 HELP = "run a virtual skin that sends the very bytes of a real one"
 EXAMPLE = """\
@@ -57,86 +55,64 @@ Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an opt
 """
 
 
+_MAX_SCRIPT = 1 << 20  # bytes of a script
+_FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
+# of the electronics, and of time
+_ELECTRIC_FLAWS = frozenset({"current_gain", "current_offset", "offset_counts", "mains_volts", "warming"})
+_FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(_ELECTRIC_FLAWS))
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     parser.epilog = EXAMPLE
     add = parser.add_argument
+    many: dict[str, Any] = {"action": "append", "default": []}
     add("--radius1-mm", type=float, default=54.0, help="radius of the link at end 1 (default 54)")
     add("--radius2-mm", type=float, help="radius at end 2 (default: radius 1, a cylinder)")
     add("--height-mm", type=float, default=434.0, help="distance of the ends along the axis (default 434)")
     add("--wrap-deg", type=float, default=360.0, help="angle about the axis that is covered (default 360)")
     add("--device", type=int, default=0, help="number of the device in its frames (default 0)")
     add("--sensor", type=int, default=0, help="number of the sensor in its frames (default 0)")
-    add(
-        "--sensors", type=int, default=1, metavar="N", help="send N such sensors, numbered from --sensor on (default 1)"
-    )
+    help_text = "send N such sensors, numbered from --sensor on (default 1)"
+    add("--sensors", type=int, default=1, metavar="N", help=help_text)
     add("--rate-hz", type=float, default=1000.0, help="frames per second of the sensor (default 1000)")
-    add(
-        "--touch",
-        action="append",
-        type=_argument(parse_press),
-        default=[],
-        metavar="[SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]",
-        help="add a touch to the script; may be repeated (force: 5 N by default, on each side of a grip). Shapes: "
+    help_text = (
+        "add a touch to the script; may be repeated (force: 5 N by default, on each side of a grip). Shapes: "
         f"{', '.join(TOUCH_SHAPES)}; without one, finger. seam presses on both sides of it, PHI_DEG from each edge. "
         "U_MM and PHI_DEG may be FROM..TO: the touch slides there, evenly from its start to its end. "
-        "@SENSOR is the number of the sensor touched; without it, the first",
+        "@SENSOR is the number of the sensor touched; without it, the first"
     )
-    add(
-        "--script",
-        type=Path,
-        metavar="FILE",
-        help="read touches from a file, one a line as --touch has them; # comments",
+    form = "[SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]"
+    add("--touch", type=_argument(parse_press), metavar=form, help=help_text, **many)
+    help_text = "read touches from a file, one a line as --touch has them; # comments"
+    add("--script", type=Path, metavar="FILE", help=help_text)
+    help_text = (
+        f"inject a fault; may be repeated. Names: {', '.join(_FAULT_NAMES)}. *_every and *_after count frames; "
+        "wiring is open-A, short-A-B or short-A-ground (also -supply, -rail)"
     )
-    add(
-        "--fault",
-        action="append",
-        type=_argument(parse_fault),
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"inject a fault; may be repeated. Names: {', '.join(FAULT_NAMES)}. *_every and *_after count frames; "
-        "wiring is open-A, short-A-B or short-A-ground (also -supply, -rail)",
+    add("--fault", type=_argument(parse_fault), metavar="NAME=VALUE", help=help_text, **many)
+    help_text = "the sheets: exact field, or ideal resistors (default field)"
+    add("--model", choices=MODELS, default="field", help=help_text)
+    help_text = (
+        "sheets as they are built, drawn by --seed from what their class is like: film is a good specimen, coated "
+        "a bad one (default ideal)"
     )
-    add(
-        "--model",
-        choices=MODELS,
-        default="field",
-        help="the sheets: exact field, or ideal resistors (default field)",
+    add("--specimen", choices=tuple(SHEET_CLASSES), default="ideal", help=help_text)
+    help_text = (
+        f"set one flaw of the specimen; may be repeated. Names: {', '.join(_FLAW_NAMES)}. Of sheets, leads and "
+        "lines it is a standard deviation; warming is the growth of the upper sheet's resistance [1/s]"
     )
-    add(
-        "--specimen",
-        choices=tuple(SHEET_CLASSES),
-        default="ideal",
-        help="sheets as they are built, drawn by --seed from what their class is like: film is a good specimen, coated "
-        "a bad one (default ideal)",
-    )
-    add(
-        "--flaw",
-        action="append",
-        type=_argument(parse_flaw),
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"set one flaw of the specimen; may be repeated. Names: {', '.join(FLAW_NAMES)}. Of sheets, leads and "
-        "lines it is a standard deviation; warming is the growth of the upper sheet's resistance [1/s]",
-    )
+    add("--flaw", type=_argument(_parse_flaw), metavar="NAME=VALUE", help=help_text, **many)
     add("--noise-counts", type=float, default=0.7, help="standard deviation of each reading [counts] (default 0.7)")
     add("--leak-drift", type=float, default=0.0, help="growth of the leak between the layers [S/s] (default 0)")
-    add(
-        "--seed",
-        type=int,
-        default=0,
-        help="seed of the noise; the same seed gives the same bytes (default 0)",
-    )
+    add("--seed", type=int, default=0, help="seed of the noise; the same seed gives the same bytes (default 0)")
     add("--duration-s", type=float, default=math.inf, help="end the stream after this time (default: never)")
     add("--output", metavar="FILE", help="write the bytes to this file as fast as possible; - is standard output")
-    add(
-        "--frame-length",
-        type=int,
-        choices=FRAME_LENGTHS,
-        default=FRAME_LENGTH,
-        help="bytes of a frame: 36 with one supply, 40 with that of each phase, 52 with the driven electrodes' own "
-        "potentials too (default 36)",
+    help_text = (
+        "bytes of a frame: 36 with one supply, 40 with that of each phase, 52 with the driven electrodes' own "
+        "potentials too (default 36)"
     )
+    add("--frame-length", type=int, choices=FRAME_LENGTHS, default=FRAME_LENGTH, help=help_text)
     add("--link", metavar="PATH", help="make this path a link to the port, and remove it at the end")
     add("--now", action="store_true", help="start the script at once, not when the port is opened")
     add("--json", action="store_true", help="report in JSON, one object per line")
@@ -150,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
         raise SensorError(f"--sensors must be at least 1, got {args.sensors}")
     sensors = [Sensor(frustum, args.sensor + number, device_id=args.device) for number in range(args.sensors)]
     flaws = dict(args.flaw)
-    own = {name: flaws[name] for name in typed_script.ELECTRIC_FLAWS & flaws.keys()}
+    own = {name: flaws[name] for name in _ELECTRIC_FLAWS & flaws.keys()}
     tolerance = replace(SHEET_CLASSES[args.specimen], **{k: v for k, v in flaws.items() if k not in own})
     model: ContactModel | str = args.model
     if tolerance != IDEAL_SHEETS:
@@ -158,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
 
         sensors, model = build_specimen(sensors, tolerance, args.seed, args.model)
     names = {str(sensor.sensor_id): sensor.name for sensor in sensors}
-    presses: list[tuple[str, ScriptedTouch]] = [*args.touch, *(read_script(args.script) if args.script else ())]
+    presses: list[tuple[str, ScriptedTouch]] = [*args.touch, *(_read_script(args.script) if args.script else ())]
     touches = []
     for shape, press in presses:
         if press.sensor and press.sensor not in names:
@@ -305,3 +281,108 @@ def _stoppable() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _read_script(path: Path) -> list[tuple[str, ScriptedTouch]]:
+    """Read a file of touches, one a line; empty lines and what follows a # mean nothing.
+
+    Raises:
+        SensorError: a line is no touch, or the file cannot be read; the message names the line.
+    """
+    try:
+        lines = read_file(path, _MAX_SCRIPT).decode("utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SensorError(f"{path}: cannot be read as a script of touches ({error})") from error
+    presses = []
+    for number, line in enumerate(lines, 1):
+        if text := line.partition("#")[0].strip():
+            try:
+                presses.append(parse_press(text))
+            except SensorError as error:
+                raise SensorError(f"{path}, line {number}: {error}") from error
+    return presses
+
+
+def parse_press(text: str) -> tuple[str, ScriptedTouch]:
+    """Read [SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]: the shape, and its first touch.
+
+    U_MM and PHI_DEG may each be FROM..TO, between which the touch slides. The touch names the sensor by its number.
+
+    Raises:
+        SensorError: it is something else.
+    """
+    text, _, sensor = text.partition("@")
+    shape, separator, rest = text.partition(":")
+    if not (separator and shape in TOUCH_SHAPES):
+        if shape[:1].isalpha():
+            raise SensorError(f"the shape of a touch must be one of {', '.join(TOUCH_SHAPES)}, got {shape!r}")
+        shape, rest = "finger", text
+    return shape, replace(_parse_touch(rest), sensor=sensor.strip())
+
+
+def _parse_touch(text: str) -> ScriptedTouch:
+    """Read START_S:END_S:U_MM:PHI_DEG[:FORCE_N], U_MM and PHI_DEG each as one number or as FROM..TO.
+
+    Raises:
+        SensorError: it is something else.
+    """
+    try:
+        start, end, u_mm, phi_deg, *force = text.split(":")
+        if len(force) > 1:
+            raise ValueError
+        times, forces = (float(start), float(end)), [float(part) for part in force]
+        (u, to_u), (phi, to_phi) = _parse_way(u_mm), _parse_way(phi_deg)
+    except ValueError:
+        raise SensorError(
+            f"a touch must be START_S:END_S:U_MM:PHI_DEG[:FORCE_N], got {text!r}; where it slides, U_MM or PHI_DEG is "
+            "FROM..TO"
+        ) from None
+    slide_u, slide_phi = (to_u - u) * 1e-3, math.radians(to_phi - phi)
+    touch = ScriptedTouch(*times, u * 1e-3, math.radians(phi), slide_u=slide_u, slide_phi=slide_phi)
+    return replace(touch, force=forces[0]) if forces else touch
+
+
+def _parse_way(text: str) -> tuple[float, float]:
+    first, separator, last = text.partition("..")
+    if last.startswith("."):
+        raise ValueError  # a third point would make another place of it
+    return float(first), float(last if separator else first)
+
+
+def parse_fault(text: str) -> tuple[str, int | str | WiringFaults]:
+    """Read NAME=VALUE of one fault.
+
+    Raises:
+        SensorError: no fault has that name, or the value does not suit it.
+    """
+    name, _, value = text.partition("=")
+    if name not in _FAULT_NAMES:
+        raise SensorError(f"a fault must be one of {', '.join(_FAULT_NAMES)}, got {name!r}")
+    if name == "stuck_channel":
+        return name, value
+    if name == "wiring":
+        kind, *electrodes = value.split("-")
+        if kind == "open" and electrodes:
+            return name, WiringFaults(opened=tuple(electrodes))
+        if kind == "short" and len(electrodes) == 2:
+            return name, WiringFaults(shorts=((electrodes[0], electrodes[1]),))
+        raise SensorError(f"wiring must be open-A or short-A-ground (or -supply, -rail, -B), got {value!r}")
+    try:
+        return name, int(value, 0)
+    except ValueError:
+        raise SensorError(f"fault {name} must be a whole number such as {name}=50, got {value!r}") from None
+
+
+def _parse_flaw(text: str) -> tuple[str, float]:
+    """Read NAME=VALUE of one flaw of a specimen.
+
+    Raises:
+        SensorError: no flaw has that name, or the value is no number.
+    """
+    name, _, value = text.partition("=")
+    if name not in _FLAW_NAMES:
+        raise SensorError(f"a flaw must be one of {', '.join(_FLAW_NAMES)}, got {name!r}")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise SensorError(f"flaw {name} must be a number such as {name}=0.05, got {value!r}") from None

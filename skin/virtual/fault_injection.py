@@ -85,7 +85,6 @@ class FaultInjection:
                 f"faults.stuck_channel must be one of {', '.join(_CHANNEL_NAMES)}, supply, all, "
                 f"got {self.stuck_channel!r}"
             )
-
         if self.gain_of not in _INPUT_READINGS:
             raise SensorError(f"faults.gain_of must be one of {', '.join(_INPUT_READINGS)}, got {self.gain_of!r}")
         if not 0.0 <= self.gain <= 10.0:

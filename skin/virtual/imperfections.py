@@ -89,14 +89,6 @@ class Foam:
         """Return the force that would in the end press the foam as far as it is now [N]."""
         return force + self.delayed * (state - force)
 
-    def delay(self, force: float, threshold: float) -> float:
-        """Return the time from a sudden force to the moment at which the layers meet [s]; inf below the threshold."""
-        if force <= threshold:
-            return math.inf
-        if (1.0 - self.delayed) * force >= threshold:
-            return 0.0
-        return self.relaxation_time * math.log(self.delayed * force / (force - threshold))
-
 
 @dataclass(frozen=True, slots=True)
 class ContactLaw:

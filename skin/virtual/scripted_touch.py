@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
@@ -55,16 +55,8 @@ class ScriptedTouch:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.start) and self.end > self.start):
             raise SensorError(f"a touch must end after it starts, got {self.start!r} s to {self.end!r} s")
-        units = {
-            "u": "m",
-            "phi": "rad",
-            "force": "N",
-            "rise": "s",
-            "radius": "m",
-            "grown_force": "N",
-            "growth_time": "s",
-        }
-        for name, unit in units.items():
+        units = {"u": "m", "phi": "rad", "force": "N", "rise": "s", "radius": "m"}
+        for name, unit in {**units, "grown_force": "N", "growth_time": "s"}.items():
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise SensorError(f"touch.{name} must be finite and not negative [{unit}], got {value!r}")
@@ -72,7 +64,6 @@ class ScriptedTouch:
             raise SensorError(
                 f"touch.growth_time must be above 0 s where grown_force is given, got {self.growth_time!r}"
             )
-
         if not (math.isfinite(self.slide_u) and math.isfinite(self.slide_phi)):
             raise SensorError(
                 "touch.slide_u and touch.slide_phi must be finite [m, rad], "
@@ -216,27 +207,15 @@ def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[floa
     return (cone.wrap - inside if over_start else inside), share
 
 
-def palm_over_seam(cone: Frustum, touch: ScriptedTouch, angle: float) -> list[ScriptedTouch]:
-    """Press on both sides of the seam at equal u, at an angle from each edge [rad], as a palm that lies over it."""
-    return _at(cone, touch, [(touch.u, angle), (touch.u, cone.wrap - angle)])
-
-
-def grip(cone: Frustum, touch: ScriptedTouch) -> list[ScriptedTouch]:
-    """Press on the opposite side at equal u as well, as a hand does that closes around the link."""
-    return _at(cone, touch, [(touch.u, touch.phi), (touch.u, (touch.phi + math.pi) % (2.0 * math.pi))])
-
-
-def fingers(cone: Frustum, touch: ScriptedTouch, offsets: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:
-    """Press with several fingers around a place, each at an offset along the side and around it [m]."""
-    radius = cone.radius_at(touch.u)
-    return _at(cone, touch, [(touch.u + along, touch.phi + around / radius) for along, around in offsets])
-
-
-def _at(cone: Frustum, touch: ScriptedTouch, places: Sequence[tuple[float, float]]) -> list[ScriptedTouch]:
-    for u, phi in places:
-        if not (0.0 <= u <= cone.slant and 0.0 <= phi <= cone.wrap):
-            raise SensorError(
-                f"each press must lie on the sensor: u up to {cone.slant:g} m and phi up to {cone.wrap:g} rad, got "
-                f"{u!r} m and {phi!r} rad"
-            )
-    return [replace(touch, u=u, phi=phi) for u, phi in places]
+_PALM_RADIUS = 0.03  # m; radius of its face
+_FINGER_DISTANCE = 0.02  # m along the link
+#: Shape -> the touches that make it of the first one, on a sensor's active area.
+TOUCH_SHAPES: dict[str, Callable[[Frustum, ScriptedTouch], list[ScriptedTouch]]] = {
+    "finger": lambda _, touch: [touch],
+    "palm": lambda _, touch: [replace(touch, radius=_PALM_RADIUS)],
+    "fingers": lambda _, touch: [replace(touch, u=touch.u + k * _FINGER_DISTANCE) for k in (-1, 0, 1)],
+    # a hand that closes around the link
+    "grip": lambda _, touch: [touch, replace(touch, phi=(touch.phi + math.pi) % (2.0 * math.pi))],
+    # a palm that lies over the seam, so far from each edge
+    "seam": lambda cone, touch: [touch, replace(touch, phi=cone.wrap - touch.phi)],
+}

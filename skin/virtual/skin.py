@@ -19,7 +19,7 @@ from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, DrivenPotentials, Fr
 from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, join, measure
 from .fault_injection import FaultInjection, FaultyLine
 from .imperfections import Imperfections
-from .ladder import RIGHT_WIRES, RewiredSheets
+from .ladder import RIGHT_WIRES, ResistorLadder, RewiredSheets
 from .scripted_touch import PlacedTouch, ScriptedTouch, across_seam
 
 MODELS = ("field", "ladder")
@@ -230,13 +230,11 @@ class VirtualSkin:
         values = volts._asdict()
         if real.settling_time:
             left_over = math.exp(-1.0 / (3.0 * self.rate_hz * len(self.sensors) * real.settling_time))
-            supply = parts.supply_volts
-            at_c, at_d = (supply, 0.0) if sensor.c_positive else (0.0, supply)
-            rest = (at_c, at_d, volts.touch_c, volts.touch_d)  # the wires' potentials one phase before
-            for name, left in zip(("touch_c", "touch_d", "radial_c", "radial_d"), rest, strict=True):
-                values[name] += left_over * (left - values[name])
-            at_a, at_b = (0.0, supply) if sensor.b_positive else (supply, 0.0)
-            for name, left in (("angular_a", at_a), ("angular_b", at_b)):
+            a, b = (0.0, parts.supply_volts) if sensor.b_positive else (parts.supply_volts, 0.0)
+            c, d = (parts.supply_volts, 0.0) if sensor.c_positive else (0.0, parts.supply_volts)
+            before = {"touch_c": c, "touch_d": d, "radial_c": volts.touch_c, "radial_d": volts.touch_d}
+            before |= {"angular_a": a, "angular_b": b}  # the wires' potentials one phase before
+            for name, left in before.items():
                 values[name] += left_over * (left - values[name])
         full, counts = parts.full_count, {}
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
@@ -275,8 +273,6 @@ def contact_model(name: str) -> ContactModel:
 
         return FieldContacts()
     if name == "ladder":
-        from .ladder import ResistorLadder
-
         return ResistorLadder()
     raise SensorError(f"the model of a virtual skin must be one of {', '.join(MODELS)}, got {name!r}")
 

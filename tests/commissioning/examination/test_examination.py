@@ -159,7 +159,8 @@ def test_a_clock_that_a_busy_computer_cannot_judge_is_no_fault_of_the_firmware()
     def clock(late: float) -> Finding:
         seen = SensorStatistics()
         for time, frame in VirtualSkin(parse_scene(TEXT).sensors[0].sensor, duration=3.0, model="ladder").frames():
-            seen.add(time + late * (time > 1.5), frame)
+            seen.frames.append(frame)
+            seen.times.append(time + late * (time > 1.5))
         (found,) = (one for one in _timing("skin", seen, 0.0, 0.05) if one.item == "skin, clock")
         return found
 

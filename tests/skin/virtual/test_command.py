@@ -17,7 +17,7 @@ from coneskin.skin.detection.events import TouchBegan, TouchMoved
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort
-from coneskin.skin.virtual import command, typed_script
+from coneskin.skin.virtual import command
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FrameDecoder
@@ -39,12 +39,12 @@ def run(*words: str) -> int:
 
 
 def test_a_touch_is_read_in_millimetres_and_degrees():
-    assert typed_script._parse_touch("1:1.5:200:90") == ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2)
-    assert typed_script._parse_touch("1:1.5:200:90:7").force == 7.0
-    assert typed_script.parse_press("1:1.5:200:90") == ("finger", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
-    assert typed_script.parse_press("grip:1:1.5:200:90") == ("grip", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
+    assert command._parse_touch("1:1.5:200:90") == ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2)
+    assert command._parse_touch("1:1.5:200:90:7").force == 7.0
+    assert command.parse_press("1:1.5:200:90") == ("finger", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
+    assert command.parse_press("grip:1:1.5:200:90") == ("grip", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
     with pytest.raises(SensorError, match="must be one of finger, palm, fingers, grip, seam, got 'fist'"):
-        typed_script.parse_press("fist:1:1.5:200:90")
+        command.parse_press("fist:1:1.5:200:90")
 
 
 @pytest.mark.parametrize(("shape", "contacts"), [("finger", 1), ("palm", 1), ("fingers", 3), ("grip", 2), ("seam", 2)])
@@ -68,7 +68,7 @@ def test_every_shape_and_every_length_reach_the_bytes(shape, contacts, tmp_path,
 @pytest.mark.parametrize("text", ["", "1:2:3", "1:2:3:4:5:6", "a:b:c:d", "2:1:100:10"])
 def test_a_touch_that_cannot_be(text):
     with pytest.raises(SensorError, match="a touch must"):
-        typed_script._parse_touch(text)
+        command._parse_touch(text)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_touch_that_cannot_be(text):
 )
 def test_a_fault_that_cannot_be(text, words):
     with pytest.raises(SensorError, match=words):
-        typed_script.parse_fault(text)
+        command.parse_fault(text)
 
 
 def test_a_file_holds_the_bytes_of_the_virtual_skin(tmp_path, capsys):

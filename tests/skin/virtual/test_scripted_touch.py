@@ -14,10 +14,10 @@ from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual import scripted_touch
+from coneskin.skin.virtual.command import parse_press
 from coneskin.skin.virtual.imperfections import ContactLaw, Foam, Imperfections
-from coneskin.skin.virtual.scripted_touch import ScriptedTouch, across_seam, fingers, palm_over_seam
+from coneskin.skin.virtual.scripted_touch import TOUCH_SHAPES, ScriptedTouch, across_seam
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.virtual.typed_script import TOUCH_SHAPES, parse_press
 
 SENSOR = Sensor(Frustum(0.054, 0.054, 0.434))
 SLIDE = ScriptedTouch(0.05, 1.05, 0.1, 1.0, slide_u=0.2, slide_phi=1.0)
@@ -135,10 +135,10 @@ def opposite(touch, **changes):
 @pytest.mark.parametrize(
     "shape",
     [
-        palm_over_seam(FOREARM, TOUCH, math.radians(20.0)),
+        TOUCH_SHAPES["seam"](FOREARM, replace(TOUCH, phi=math.radians(20.0))),
         opposite(TOUCH, force=3.0),
         opposite(TOUCH, u=0.05),
-        fingers(FOREARM, TOUCH, [(-0.02, -0.03), (0.02, 0.03)]),
+        [replace(TOUCH, u=TOUCH.u + 0.02 * k, phi=TOUCH.phi + 0.8 * k) for k in (-1, 1)],
     ],
     ids=["palm", "uneven grip", "clamp", "fingers"],
 )
@@ -175,8 +175,8 @@ def test_the_part_beyond_the_gap():
 
 
 def test_a_press_off_the_sensor_is_refused():
-    with pytest.raises(SensorError, match="each press must lie on the sensor"):
-        fingers(FOREARM, TOUCH, [(0.2, 0.0)])
+    with pytest.raises(SensorError, match=r"a touch must lie on sensor 0/0: .* got 0\.25"):
+        VirtualSkin(Sensor(FOREARM), TOUCH_SHAPES["fingers"](FOREARM, replace(TOUCH, u=0.23)), model="ladder")
     with pytest.raises(SensorError, match=r"touch\.growth_time must be above 0 s"):
         ScriptedTouch(0.0, 1.0, 0.1, 1.0, grown_force=5.0)
 

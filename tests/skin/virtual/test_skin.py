@@ -104,10 +104,11 @@ def test_a_touch_is_read_where_the_script_puts_it():
 
 def test_a_touch_closes_when_the_foam_lets_it_and_opens_late():
     imperfections = Imperfections(noise_counts=0.0, foam=Foam(0.02, 0.6))
-    # 0.9 N at once: the layers meet after foam.delay; 5 N released: 0.6 * 5 exp(-t/tau) holds above 0.5 N
+    # 0.9 N at once: the layers meet once 0.9 (1 - 0.6 exp(-t/tau)) is 0.5 N; 5 N released: 0.6 * 5 exp(-t/tau) holds
+    # them together above that
     faint, firm = (ScriptedTouch(0.01, 0.2, 0.1, 2.0, force=force, rise=0.0) for force in (0.9, 5.0))
     for touch, closes, opens in (
-        (faint, 0.01 + imperfections.foam.delay(0.9, 0.5), 0.2 + 0.02 * math.log(0.6 * 0.9 / 0.5)),
+        (faint, 0.01 + 0.02 * math.log(0.6 * 0.9 / (0.9 - 0.5)), 0.2 + 0.02 * math.log(0.6 * 0.9 / 0.5)),
         (firm, 0.01, 0.2 + 0.02 * math.log(0.6 * 5 / 0.5)),
     ):
         skin = VirtualSkin(SENSOR, [touch], imperfections=imperfections, duration=0.3)

@@ -34,15 +34,7 @@ _MAX_MOTION = 0.02  # rad; the words for the marks are of one posture
 
 
 class _ArmWatch:
-    """States of one arm.
-
-    Args:
-        arm: of the scene.
-        stack: that closes their reader.
-
-    Attributes:
-        q: joint positions at the beginning [rad].
-    """
+    """States of one arm, whose reader a stack closes; ``q``: joint positions at the beginning [rad]."""
 
     def __init__(self, arm: ArmScene, stack: ExitStack) -> None:
         model = arm_model(arm.model)
@@ -59,13 +51,7 @@ class _ArmWatch:
             self._read()
 
     def check(self) -> None:
-        """Raise where the arm has moved, or is not measured any more.
-
-        Raises:
-            RobotRefused: it has moved since the beginning.
-            RobotTimeout: its controller is silent.
-            RobotConnectionError: its controller is gone.
-        """
+        """Raise where the arm has moved, or its controller is silent or gone."""
         self._read()
         if time.monotonic() - self._heard > _STATE_TIMEOUT:
             raise RobotTimeout(f"the controller has sent no state for {_STATE_TIMEOUT:g} s")
@@ -90,21 +76,13 @@ _VIRTUAL_DURATION = 0.5  # s, of the touches of a virtual skin
 
 
 def prepare(scene: Scene, q: Sequence[float] | None) -> Procedure:
-    """Return the procedure for a scene.
-
-    Args:
-        scene: whose sensors are commissioned.
-        q: joint positions of its arm now [rad]; None without an arm.
+    """Return the procedure for a scene, its arm at joint positions q [rad]; None without an arm.
 
     Raises:
         RobotRefused: a sensor is too small for marks that show every misreading.
     """
-    placed = place_sensors(scene)
-    sensors = [
-        SensorMarks(item.sensor, place.link_name, offer_marks(item.sensor, place, q))
-        for item, place in zip(scene.sensors, placed, strict=True)
-    ]
-    procedure = Procedure(sensors)
+    pairs = zip(scene.sensors, place_sensors(scene), strict=True)
+    procedure = Procedure([SensorMarks(item.sensor, offer_marks(item.sensor, place, q)) for item, place in pairs])
     if procedure.incomplete:
         raise RobotRefused(procedure.incomplete)
     return procedure
@@ -160,9 +138,8 @@ class Commissioner:
         wrong = [watch.contradiction(item.sensor.name) for item in procedure.sensors]
         cause = procedure.cause or "; ".join(filter(None, wrong))
         results = tuple(result for item in procedure.sensors for result in item.results)
-        date = datetime.now(UTC).isoformat(timespec="seconds")
-        scene_hash = fingerprint(self._scene)
-        return CommissioningRecord(date, __version__, scene_hash, procedure.passed and not cause, cause, by, results)
+        date, passed = datetime.now(UTC).isoformat(timespec="seconds"), procedure.passed and not cause
+        return CommissioningRecord(date, __version__, fingerprint(self._scene), passed, cause, by, results)
 
     def _posture(self, stack: ExitStack) -> tuple[Sequence[float] | None, Callable[[], None]]:
         """Return the joint positions to describe marks for, and a check that they stay."""

@@ -32,11 +32,6 @@ _EDGE_PART = 0.1  # part of the wrap beside each edge without marks
 _FINGER_WIDTH = 0.015  # m from an edge that a finger needs
 
 
-def _slant_places(sensor: Sensor) -> list[float]:
-    """Return the slant distances at which a sensor may have marks [m]."""
-    return [part * sensor.frustum.slant for part in _SLANT_PARTS]
-
-
 def _azimuth_margin(sensor: Sensor) -> float:
     """Return the azimuth beside each straight edge in which a sensor has no marks [rad]."""
     cone = sensor.frustum
@@ -112,7 +107,7 @@ def offer_marks(sensor: Sensor, placed: SensorOnArm, q: Sequence[float] | None) 
 def _on_sheet(sensor: Sensor, step: float) -> list[Mark]:
     cone, margin = sensor.frustum, _azimuth_margin(sensor)
     marks = []
-    for u in _slant_places(sensor):
+    for u in (part * cone.slant for part in _SLANT_PARTS):
         for number in range(1, math.ceil(math.degrees(cone.wrap) / step)):
             phi = math.radians(number * step)
             if margin <= phi <= cone.wrap - margin:
@@ -197,7 +192,7 @@ def _from_joint(placed: SensorOnArm, model: ArmModel, u: float) -> float:
 
 def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float]:
     """Return slant distances of marks whose distance from the joint is a round number [m]."""
-    places = _slant_places(sensor)
+    places = [part * sensor.frustum.slant for part in _SLANT_PARTS]
     if placed.link not in _TUBE_LINKS or sensor.frustum.slant < 20.0 * _DISTANCE_STEP:
         return places
     found = [_from_joint(placed, model, u) for u in places]

@@ -32,7 +32,6 @@ class SensorMarks:
 
     Attributes:
         sensor: the sensor.
-        link: on which it is.
         offered: all places that can be described.
         plan: places to touch, those touched already first.
         refused: places that a person cannot reach.
@@ -42,7 +41,6 @@ class SensorMarks:
     """
 
     sensor: Sensor
-    link: str
     offered: Sequence[Mark]
     plan: tuple[Mark, ...] = ()
     refused: list[Mark] = field(default_factory=list)

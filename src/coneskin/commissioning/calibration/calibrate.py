@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from coneskin.commissioning.misreadings import Place
 from coneskin.commissioning.skin_watch import SkinWatch, TouchSession
 from coneskin.commissioning.touching import Mark
 from coneskin.core.errors import SceneError, SkinError
@@ -40,16 +42,15 @@ def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
         count: their number, one of MARK_COUNTS.
     """
     cone = sensor.frustum
-    return tuple(
-        Mark(along * cone.slant, around * cone.wrap, _place_words(along * cone.slant, along, around))
-        for along, around in mark_parts(math.isqrt(count))
-    )
+    places = (Place(along * cone.slant, around * cone.wrap) for along, around in mark_parts(math.isqrt(count)))
+    return tuple(Mark(*place, _place_words(sensor, place)) for place in places)
 
 
-def _place_words(u: float, along: float, around: float) -> str:
-    """Return how a person finds a place: slant distance from end 1 [m], parts of the slant and of the wrap."""
+def _place_words(sensor: Sensor, place: Place) -> str:
+    """Return how a person finds a place."""
+    along, around = place.u / sensor.frustum.slant, place.phi / sensor.frustum.wrap
     return (
-        f"{1e3 * u:.1f} mm from electrode B (end 1) along the side, which is {100.0 * along:.0f} % of the way "
+        f"{1e3 * place.u:.1f} mm from electrode B (end 1) along the side, which is {100.0 * along:.0f} % of the way "
         f"to A, and {100.0 * around:.0f} % of the way around from electrode D to C (between their inner edges)"
     )
 
@@ -63,14 +64,14 @@ _SIZE_TOLERANCE = 1e-3  # mm or deg; design.json is rounded
 def _printed_marks(sensor: Sensor, sheet: Mapping[str, Any]) -> tuple[Mark, ...]:
     """Return the marks that are printed on the cover of a sensor; none where its sheet in design.json is another."""
     cone, drawn = sensor.frustum, sheet.get("active_cone", {})
-    own = {key.name: key.in_file_unit(getattr(cone, key.plain)) for key in CONE_KEYS}
-    if any(abs(drawn.get(name, math.inf) - value) > _SIZE_TOLERANCE for name, value in own.items()):
+    sizes = ((drawn.get(key.name, math.inf), key.in_file_unit(getattr(cone, key.plain))) for key in CONE_KEYS)
+    if any(abs(size - own) > _SIZE_TOLERANCE for size, own in sizes):
         return ()
     marks = []
     for row in sheet.get("touch_marks", ()):
-        u, phi = 1e-3 * row["u_mm"], math.radians(row["phi_deg"])
-        words = _place_words(u, u / cone.slant, phi / cone.wrap)
-        marks.append(Mark(u, phi, f"at the cross with number {row['number']}, {words}"))
+        place = Place(1e-3 * row["u_mm"], math.radians(row["phi_deg"]))
+        words = f"at the cross with number {row['number']}, {_place_words(sensor, place)}"
+        marks.append(Mark(*place, words))
     return tuple(marks)
 
 
@@ -87,8 +88,7 @@ def _find_design(sensor_file: Path) -> Mapping[str, Any] | None:
         path = place / _DESIGN_FILE
         if path.is_file():
             try:
-                sheets = read_json(read_file(path, _MAX_BYTES))["sheets"]
-                return dict(sheets[number])
+                return dict(read_json(read_file(path, _MAX_BYTES))["sheets"][number])
             except (OSError, ValueError, TypeError, LookupError) as exc:
                 raise SceneError([f"the marks of {path} cannot be read: {exc}"], path.name) from exc
     return None
@@ -104,14 +104,12 @@ class CalibrationResult:
 
     Attributes:
         touches: of its marks.
-        sheet_ohms: what its untouched sheets have per square, upper and lower, as their currents say [ohm].
         fit: None where the sensor was refused.
         record: to be added to the file of its device; None where it was refused.
         refusal: why it cannot be calibrated; empty where it can.
     """
 
     touches: SensorTouches
-    sheet_ohms: tuple[float, float]
     fit: CalibrationFit | None = None
     record: CalibrationRecord | None = None
     refusal: str = ""
@@ -138,10 +136,8 @@ class Calibrator:
     ) -> None:
         self._session = session
         self._mark_error = mark_error
-        self.sensors = [
-            SensorTouches(item.sensor, _marks(item.sensor, marks, files[n] if files else None))
-            for n, item in enumerate(session.scene.sensors)
-        ]
+        pairs = itertools.zip_longest(session.scene.sensors, files)
+        self.sensors = [SensorTouches(item.sensor, _marks(item.sensor, marks, file)) for item, file in pairs]
         self._forces = tuple(forces)
         self._pressed = [SensorPresses(item.sensor, _pressed_marks(item.marks)) for item in self.sensors]
 
@@ -176,16 +172,10 @@ class Calibrator:
             if contradiction:  # the fit names other mistakes first
                 raise SkinError(f"{sensor.name} cannot be calibrated: {contradiction}")
         except SkinError as exc:
-            return CalibrationResult(item, ohms, refusal=str(exc))
+            return CalibrationResult(item, refusal=str(exc))
         used = dict(zip(valid, fit.used, strict=True))
         touches = tuple(
-            TouchResult(
-                round(1e3 * mark.u, 3),
-                round(math.degrees(mark.phi), 4),
-                round(1e3 * read.u, 3),
-                round(math.degrees(read.phi), 4),
-                used.get(number, False),
-            )
+            TouchResult(*_in_file_units(mark), *_in_file_units(read), used.get(number, False))
             for number, (mark, read) in enumerate(item.touches)
         )
         record = CalibrationRecord(
@@ -200,11 +190,11 @@ class Calibrator:
             map_around=fit.place_map.around,
             fitted_along=fit.along,
             fitted_around=fit.around,
-            before_rms_mm=round(1e3 * fit.before.rms, 3),
-            before_largest_mm=round(1e3 * fit.before.largest, 3),
-            after_rms_mm=round(1e3 * fit.after.rms, 3),
-            after_largest_mm=round(1e3 * fit.after.largest, 3),
-            map_error_mm=round(1e3 * fit.map_error, 3),
+            before_rms_mm=_in_mm(fit.before.rms),
+            before_largest_mm=_in_mm(fit.before.largest),
+            after_rms_mm=_in_mm(fit.after.rms),
+            after_largest_mm=_in_mm(fit.after.largest),
+            map_error_mm=_in_mm(fit.map_error),
             extra_ohm=tuple(round(value, 1) for value in fit.extra_ohms),
             sheet_ohm=tuple(round(value, 1) for value in ohms),
             touches=touches,
@@ -212,7 +202,15 @@ class Calibrator:
             force_levels=forces.levels if forces else (),
             force_error=forces.error if forces else 0.0,
         )
-        return CalibrationResult(item, ohms, fit, record)
+        return CalibrationResult(item, fit, record)
+
+
+def _in_mm(metres: float) -> float:
+    return round(1e3 * metres, 3)
+
+
+def _in_file_units(place: Place) -> tuple[float, float]:
+    return _in_mm(place.u), round(math.degrees(place.phi), 4)
 
 
 def _pressed_marks(marks: Sequence[Mark]) -> tuple[Mark, ...]:

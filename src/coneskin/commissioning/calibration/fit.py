@@ -39,21 +39,14 @@ class KnownTouch(NamedTuple):
 
 
 def _check_touches(sensor: Sensor, touches: Sequence[KnownTouch]) -> None:
-    """Refuse touches that nothing can be fitted to, and those that a wiring or a mounting explains.
-
-    Raises:
-        SkinError: says what is missing, or the cause.
-    """
+    """Refuse touches that nothing can be fitted to, and those that a wiring or a mounting explains."""
     places = sorted({touch.mark for touch in touches})
     along, around = [mark.u for mark in places], [mark.phi for mark in places]
-    cone = sensor.frustum
-    enough = len(places) >= MIN_TOUCHES
-    enough = (
-        enough
-        and max(along) - min(along) >= _MIN_EXTENT * cone.slant
-        and max(around) - min(around) >= _MIN_EXTENT * cone.wrap
+    wide = (
+        (max(values) - min(values) >= _MIN_EXTENT * size)
+        for values, size in ((along, sensor.frustum.slant), (around, sensor.frustum.wrap))
     )
-    if not enough:
+    if len(places) < MIN_TOUCHES or not all(wide):
         got = ", ".join(f"{1e3 * mark.u:.0f} mm, {math.degrees(mark.phi):.0f} deg" for mark in places)
         raise SkinError(
             f"{sensor.name}: a calibration needs touches at {MIN_TOUCHES} places or more, the outermost of them "
@@ -67,19 +60,9 @@ def _check_touches(sensor: Sensor, touches: Sequence[KnownTouch]) -> None:
 
 
 def _check_offsets_and_gains(
-    sensor: Sensor, along: Sequence[float], around: Sequence[float], sheet_ohms: tuple[float, float] | None = None
+    sensor: Sensor, along: Sequence[float], around: Sequence[float], sheet_ohms: tuple[float, float] | None
 ) -> None:
-    """Refuse offsets and gains that are no small error of this sheet.
-
-    Args:
-        sensor: that was touched.
-        along: offset and gain that would be fitted to the fraction along.
-        around: the same around.
-        sheet_ohms: what its untouched sheets have per square, if they are as large as the scene says [ohm].
-
-    Raises:
-        SkinError: says the likely mistake.
-    """
+    """Refuse offsets and gains, along and around, that are no small error of this sheet, with the likely mistake."""
     cone = sensor.frustum
     sizes = cone.slant, cone.wrap * cone.radius_at(0.5 * cone.slant)
     hint = ""
@@ -109,11 +92,7 @@ def _check_offsets_and_gains(
 
 
 def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]) -> None:
-    """Refuse a map that bends places by more than any sheet of some quality does.
-
-    Raises:
-        SkinError: with the numbers.
-    """
+    """Refuse a map that bends places by more than any sheet of some quality does."""
     for word, numbers in (("along", along), ("around", around)):
         if any(abs(value) > most for value, most in zip(numbers, MAP_LIMITS, strict=True)):
             raise SkinError(
@@ -189,8 +168,17 @@ class _Axis(NamedTuple):
     terms: Floats
     metres: Floats
 
+    @property
+    def missed(self) -> Floats:
+        """What is missing to the mark [m]."""
+        return self.missing * self.metres
+
     def pick(self, chosen: NDArray[np.bool_]) -> _Axis:
         return _Axis(self.missing[chosen], self.terms[chosen], self.metres[chosen])
+
+    def rest(self, numbers: Floats) -> Floats:
+        """Return what these numbers leave [m]."""
+        return (self.missing - self.terms @ numbers) * self.metres
 
 
 def fit_map(
@@ -215,17 +203,15 @@ def fit_map(
     axes = _axes(sensor, touches)
     used = _agreeing(axes, mark_error)
     inside = [axis.pick(used) for axis in axes]
-    affine = [_solve(axis, _AFFINE_TERMS).tolist() for axis in inside]
-    _check_offsets_and_gains(sensor, affine[0][:2], affine[1][:2], sheet_ohms)
+    along, around = (_solve(axis, _AFFINE_TERMS).tolist()[:2] for axis in inside)
+    _check_offsets_and_gains(sensor, along, around, sheet_ohms)
     posteriors = [_average(axis, mark_error) for axis in inside]
     numbers = [posterior.numbers.tolist() for posterior in posteriors]
     _check_bends(sensor, *numbers)
     place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
     left = [posterior.left for posterior in posteriors]
     map_error, next_mark, then = _untouched_error(sensor, posteriors, mark_error)
-    every = [
-        (axis.missing - axis.terms @ np.array(values)) * axis.metres for axis, values in zip(axes, numbers, strict=True)
-    ]
+    every = [axis.rest(posterior.numbers) for axis, posterior in zip(axes, posteriors, strict=True)]
     for whole, part in zip(every, left, strict=True):
         whole[used] = part
     return CalibrationFit(
@@ -233,8 +219,8 @@ def fit_map(
         posteriors[0].words,
         posteriors[1].words,
         tuple(bool(value) for value in used),
-        Errors.of(inside[0].missing * inside[0].metres, inside[1].missing * inside[1].metres),
-        Errors.of(left[0], left[1]),
+        Errors.of(inside[0].missed, inside[1].missed),
+        Errors.of(*left),
         tuple(zip(every[0].tolist(), every[1].tolist(), strict=True)),
         map_error,
         next_mark,
@@ -281,9 +267,7 @@ def _slope(sensor: Sensor, u: float) -> float:
 def _solve(axis: _Axis, count: int) -> Floats:
     """Return the numbers that fit best in metres; those that are not fitted are zero."""
     numbers = np.zeros(len(MAP_LIMITS))
-    if count:
-        weighed = axis.terms[:, :count] * axis.metres[:, None]
-        numbers[:count] = np.linalg.lstsq(weighed, axis.missing * axis.metres, rcond=None)[0]
+    numbers[:count] = np.linalg.lstsq(axis.terms[:, :count] * axis.metres[:, None], axis.missed, rcond=None)[0]
     return numbers
 
 
@@ -299,7 +283,7 @@ class _Posterior(NamedTuple):
 
 def _average(axis: _Axis, mark_error: float) -> _Posterior:
     """Fit all widths of the priors, and average by how likely each makes the touches."""
-    design, missing = axis.terms * axis.metres[:, None], axis.missing * axis.metres
+    design, missing = axis.terms * axis.metres[:, None], axis.missed
     count = len(missing)
     fits = []
     for affine, shear, bend, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _BEND_WIDTHS, _REST_RATIOS):
@@ -363,17 +347,13 @@ def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
         most = int(_MAX_WRONG * count)
         limit = max(_MAX_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
         used = misses <= limit
-        fitted = [_solve(axis.pick(used), 2) for axis in axes]
-        rest = [
-            np.abs(axis.missing - axis.terms @ numbers) * axis.metres
-            for axis, numbers in zip(axes, fitted, strict=True)
-        ]
+        rest = [np.abs(axis.rest(_solve(axis.pick(used), 2))) for axis in axes]
     return used
 
 
 def _least_median(axis: _Axis) -> Floats:
     """Return what is missing [m] from the line through two touches that is nearest to most others (Rousseeuw 1984)."""
-    at, best, least = axis.terms[:, 1], axis.missing * axis.metres, math.inf
+    at, best, least = axis.terms[:, 1], axis.missed, math.inf
     for i, j in combinations(range(len(at)), 2):
         if abs(at[i] - at[j]) >= _MIN_SPACING:
             gain = (axis.missing[j] - axis.missing[i]) / (at[j] - at[i])

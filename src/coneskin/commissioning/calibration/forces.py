@@ -9,7 +9,7 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.commissioning.touching import Held, Mark, Notice, TouchJudge
@@ -41,11 +41,9 @@ def fit_forces(presses: Sequence[_KnownPress]) -> ForceTable:
     Raises:
         SkinError: the level does not rise with the force; the message says from which on.
     """
-    table = _table(presses)
-    forces = sorted({press.force for press in presses})
-    logs = {f: [_log(p.level) for p in presses if p.force == f] for f in forces}
+    table, logs = _table(presses), _logs(presses)
     spread = math.sqrt(statistics.fmean([statistics.pvariance(values) for values in logs.values()]))
-    for low, high in pairwise(forces):
+    for low, high in pairwise(logs):
         rise = statistics.fmean(logs[high]) - statistics.fmean(logs[low])
         if rise < _MIN_RISE * spread * math.sqrt(2.0 / len(logs[high])):
             raise SkinError(
@@ -55,27 +53,27 @@ def fit_forces(presses: Sequence[_KnownPress]) -> ForceTable:
     missed = []
     for place in sorted({press.place for press in presses}):
         rest = _table([press for press in presses if press.place != place])
-        for press in presses:
-            if press.place == place:
-                level = min(max(press.level, rest.levels[0]), rest.levels[-1])
-                read = rest.force(level)
-                assert read is not None
-                missed.append(math.log(read[0] / press.force))
+        for press in [press for press in presses if press.place == place]:
+            read = rest.force(min(max(press.level, rest.levels[0]), rest.levels[-1]))
+            assert read is not None
+            missed.append(math.log(read[0] / press.force))
     error = math.hypot(_MODEL_ERROR, math.sqrt(statistics.fmean([value * value for value in missed])))
     return ForceTable(table.forces, table.levels, round(min(error, 0.99), 4))
 
 
 def _table(presses: Sequence[_KnownPress]) -> ForceTable:
-    forces = sorted({press.force for press in presses})
-    strengths = [math.exp(statistics.fmean([_log(p.level) for p in presses if p.force == f])) for f in forces]
+    logs = _logs(presses)
+    strengths = [math.exp(statistics.fmean(values)) for values in logs.values()]
     try:
-        return ForceTable(tuple(forces), tuple(round(s / (1.0 + s), 5) for s in strengths), 0.0)
+        return ForceTable(tuple(logs), tuple(round(s / (1.0 + s), 5) for s in strengths), 0.0)
     except SensorError as exc:
         raise SkinError(f"the level does not rise with the force: {exc}") from exc
 
 
-def _log(level: float) -> float:
-    return math.log(level / (1.0 - level))
+def _logs(presses: Sequence[_KnownPress]) -> dict[float, list[float]]:
+    """Return force [N], rising -> the logarithm of level / (1 - level) of each press with it."""
+    forces = sorted({press.force for press in presses})
+    return {f: [math.log(p.level / (1.0 - p.level)) for p in presses if p.force == f] for f in forces}
 
 
 _STANDARD_GRAVITY = 9.80665  # m/s2
@@ -85,17 +83,11 @@ _LEVEL_CHANGE = 0.004  # of the level; the change from the first half of them to
 
 @dataclass
 class SensorPresses:
-    """Presses of one sensor with known forces.
-
-    Attributes:
-        sensor: the sensor.
-        marks: to press.
-        presses: made so far.
-    """
+    """Presses of one sensor with known forces."""
 
     sensor: Sensor
-    marks: Sequence[Mark]
-    presses: list[_KnownPress] = field(default_factory=list)
+    marks: Sequence[Mark]  #: to press
+    presses: list[_KnownPress] = field(default_factory=list)  #: made so far
 
 
 class ForceSequence(TouchJudge["TouchReading"]):
@@ -112,9 +104,8 @@ class ForceSequence(TouchJudge["TouchReading"]):
     def __init__(self, sensors: Sequence[SensorPresses], forces: Sequence[float]) -> None:
         super().__init__(2.0 * _HOLD_TIME)
         self.force = 0.0
-        self._queue = [
-            (item, place, force) for item in sensors for place in range(len(item.marks)) for force in sorted(forces)
-        ]
+        rows = ((item, range(len(item.marks)), sorted(forces)) for item in sensors)
+        self._queue = [(item, *row) for item, places, rising in rows for row in product(places, rising)]
         self._total = len(self._queue)
 
     @property

@@ -159,9 +159,6 @@ class TouchSequence(TouchJudge["TouchReading"]):
         touches = [item.touches[number] for number in item.valid]
         if len(touches) < MIN_TOUCHES:
             return []
-        wrong = {
-            touch.mark
-            for touch, agrees in zip(touches, agreeing(item.sensor, touches, self._mark_error), strict=True)
-            if not agrees
-        }
+        agrees = agreeing(item.sensor, touches, self._mark_error)
+        wrong = {touch.mark for touch, good in zip(touches, agrees, strict=True) if not good}
         return [mark for mark in item.marks if mark.place in wrong]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
+import operator
 import statistics
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.finding import Finding, Verdict, judged
@@ -20,41 +23,22 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
 _CHANNELS = MEASURED[:10]  # of the supplies, one
-_MAX_FRAMES = 20_000  # frames that are kept of a sensor
 
 
+@dataclass
 class SensorStatistics:
-    """Frames of one sensor.
+    """Frames of one sensor, and when each was read [s]."""
 
-    Attributes:
-        frames: the first of them.
-        times: at which each was read [s].
-        status: bits that any of them carried.
-    """
-
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-        self.times: list[float] = []
-        self.status = 0
-
-    def add(self, time: float, frame: Frame) -> None:
-        """Take a frame."""
-        self.status |= frame.status
-        if len(self.frames) < _MAX_FRAMES:
-            self.frames.append(frame)
-            self.times.append(time)
+    frames: list[Frame] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
 
     def numbers(self) -> FrameNumbers:
         """Measure how the frames follow each other."""
         return measure_numbers(self.frames, self.times)
 
-    def mean(self, channel: str) -> float:
-        """Return the mean of a reading [counts]."""
-        return statistics.fmean(getattr(frame, channel) for frame in self.frames)
-
-    def noise(self, channel: str) -> float:
-        """Return the standard deviation of a reading [counts]."""
-        return float(statistics.pstdev(getattr(frame, channel) for frame in self.frames))
+    def counts(self, channel: str) -> list[int]:
+        """Return a reading of all frames [counts]."""
+        return [getattr(frame, channel) for frame in self.frames]
 
 
 class SkinStatistics:
@@ -73,14 +57,14 @@ class SkinStatistics:
         self.decoder = FrameDecoder()
         self.sensors: dict[tuple[int, int], SensorStatistics] = {}
 
-    def add(self, time: float, data: bytes) -> list[Frame]:
-        """Take bytes that were read at a time [s]; return the frames that they complete."""
+    def add(self, time: float, data: bytes) -> None:
+        """Take bytes that were read at a time [s]."""
         self.received += len(data)
         self.window.feed(data, time)
-        frames = self.decoder.feed(data)
-        for frame in frames:
-            self.sensors.setdefault((frame.device, frame.sensor), SensorStatistics()).add(time, frame)
-        return frames
+        for frame in self.decoder.feed(data):
+            seen = self.sensors.setdefault((frame.device, frame.sensor), SensorStatistics())
+            seen.frames.append(frame)
+            seen.times.append(time)
 
 
 _BITS_PER_BYTE = 10  # on a serial line: start, eight, stop
@@ -110,10 +94,9 @@ def examine_line(
     count, baud = seen.decoder.frames, settings.get("baud")
     named = diagnose(seen.window.capture(now), sensors, baud)
     value = f"{count} frames in {seen.received} bytes, {seen.decoder.crc_errors} damaged"
-    if named.verdict != "ok":
-        found = [Finding("frames", "warning" if count else "bad", f"{value}; {named.value}", "", named.remedy)]
-    else:
-        found = [Finding("frames", "ok" if count else "bad", value)]
+    good = named.verdict == "ok"
+    verdict: Verdict = "bad" if not count else "ok" if good else "warning"
+    found = [Finding("frames", verdict, value if good else f"{value}; {named.value}", "", "" if good else named.remedy)]
     expected = {(sensor.device_id, sensor.sensor_id) for sensor in sensors}
     for device, number in sorted(expected - seen.sensors.keys()):
         there = ", ".join(f"{d}/{s}" for d, s in sorted(seen.sensors)) or "none"
@@ -180,18 +163,17 @@ def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> 
 def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     name, parts = sensor.name, sensor.electronics
     expected = parts.supply_volts / parts.adc_volts * parts.full_count
-    supply = seen.mean("touch_supply")
+    supply = statistics.fmean(seen.counts("touch_supply"))
     good = abs(supply - expected) <= _SUPPLY_ERROR * expected
     remedy = "correct supply_v, adc_v and adc_bits of the sensor, or the supply itself"
     found = [judged(f"{name}, supply", good, f"{supply:.0f} counts", f"{expected:.0f} +- 10 %", remedy)]
     guides = [channel for channel in _CHANNELS if not channel.endswith(("current", "supply"))]
-    worst = max(guides, key=seen.mean)
-    part = seen.mean(worst) / max(supply, 1.0)
+    parts_of_supply = {channel: statistics.fmean(seen.counts(channel)) / max(supply, 1.0) for channel in guides}
+    worst, part = max(parts_of_supply.items(), key=operator.itemgetter(1))
     remedy = "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
     value = f"at most {100.0 * part:.2f} % of the supply, on {worst}"
     found.append(judged(f"{name}, guides", part <= _GUIDE_NOISE, value, "untouched: at most 1 %", remedy))
-    status = seen.status & _STATUS_FAULTS
-    if status:
+    if status := functools.reduce(operator.or_, seen.counts("status")) & _STATUS_FAULTS:
         value = f"the device reports {', '.join(bit.name or str(bit.value) for bit in Status if bit & status)}"
         found.append(Finding(f"{name}, status", "bad", value, "none", "docs/look-up/wire-format.md"))
     return found
@@ -199,7 +181,7 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
 
 def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     name = sensor.name
-    noise = {channel: seen.noise(channel) for channel in _CHANNELS}
+    noise = {channel: statistics.pstdev(seen.counts(channel)) for channel in _CHANNELS}
     still = ", ".join(name for name in ("radial_current", "angular_current", "touch_supply") if noise[name] == 0.0)
     scale = sensor.electronics.full_count / 4095.0
     loud = ", ".join(channel for channel, value in noise.items() if value > _MAX_NOISE * scale)
@@ -217,7 +199,7 @@ def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
         ("radial", "A and B", "upper_sheet_ohm", sensor.radial_amperes, sensor.radial_ohms, sensor.upper_sheet_ohms),
         ("angular", "C and D", "lower_sheet_ohm", sensor.angular_amperes, sensor.angular_ohms, sensor.lower_sheet_ohms),
     ):
-        measured = parts.amperes(seen.mean(f"{phase}_current"))
+        measured = parts.amperes(statistics.fmean(seen.counts(f"{phase}_current")))
         off = max(measured / design, design / measured) if measured > 0.0 else math.inf
         verdict: Verdict = "ok" if off <= _NEAR_FACTOR else "warning" if off <= _FAR_FACTOR else "bad"
         remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
