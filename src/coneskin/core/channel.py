@@ -21,7 +21,10 @@ import time
 import weakref
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import HasFileno
 
 _LENGTH_FIELD = struct.Struct("<I")
 _MAX_LENGTH = 1 << 24  # bytes of one message
@@ -29,14 +32,7 @@ _MAX_WAITING = 1 << 22  # bytes that the other side has not taken
 _BOUND_FACTOR = 2  # bounds; the second is for what is left of a shortened message
 
 
-class _HasDescriptor(Protocol):
-    """Object that the system can wait for."""
-
-    def fileno(self) -> int:
-        """Return the descriptor."""
-
-
-_Waited = TypeVar("_Waited", bound=_HasDescriptor)
+_Waited = TypeVar("_Waited", bound="HasFileno")
 
 
 def wait_readable(inputs: Sequence[_Waited], timeout: float) -> list[_Waited]:
@@ -47,7 +43,7 @@ def wait_readable(inputs: Sequence[_Waited], timeout: float) -> list[_Waited]:
     return _wait(inputs, timeout, write=False)
 
 
-def wait_writable(output: _HasDescriptor, timeout: float) -> bool:
+def wait_writable(output: HasFileno, timeout: float) -> bool:
     """Wait until this can be written, or for the timeout [s], and tell whether it can."""
     return bool(_wait([output], timeout, write=True))
 

@@ -32,15 +32,12 @@ if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to 
 
 _END_TIMEOUT = 2.0  # s for a process to end by itself
 _MIN_MEMORY = 400 * 2**20  # bytes that a process must be let take: one that loads numpy asks for 350 MB of addresses
-_LENGTH_FIELD = struct.Struct("<I")  # of what a child is told over its standard input
 
 
 def _check_memory() -> None:
     """Raise RobotConnectionError where a child would end for want of memory, by the limit that it inherits."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
+    import resource
+
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit != resource.RLIM_INFINITY and limit < _MIN_MEMORY:
         raise RobotConnectionError(
@@ -66,26 +63,18 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
     _check_memory()
     command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
     try:
-        if sys.platform == "win32":  # written from the documentation of socket.share; not run by our tests
-            child = subprocess.Popen([*command, "shared"], stdin=subprocess.PIPE)
-            assert child.stdin is not None
-            for end in ends:
-                share = end.share(child.pid)
-                child.stdin.write(_LENGTH_FIELD.pack(len(share)) + share)
-            child.stdin.close()
-        else:
-            with contextlib.ExitStack() as stack:
-                numbers = [end.fileno() for end in ends]
-                if hasattr(os, "pidfd_open"):  # Linux, from 5.3 on
-                    with contextlib.suppress(OSError):
-                        numbers.append(os.pidfd_open(os.getpid()))
-                        stack.callback(os.close, numbers[-1])
-                child = subprocess.Popen(
-                    [*command, str(len(ends)), *map(str, numbers)],
-                    pass_fds=numbers,
-                    stdin=subprocess.DEVNULL,
-                    start_new_session=True,
-                )
+        with contextlib.ExitStack() as stack:
+            numbers = [end.fileno() for end in ends]
+            if hasattr(os, "pidfd_open"):  # Linux, from 5.3 on
+                with contextlib.suppress(OSError):
+                    numbers.append(os.pidfd_open(os.getpid()))
+                    stack.callback(os.close, numbers[-1])
+            child = subprocess.Popen(
+                [*command, str(len(ends)), *map(str, numbers)],
+                pass_fds=numbers,
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+            )
     except OSError as exc:
         raise RobotConnectionError(f"cannot start the process {module}: {exc.strerror or exc}") from exc
     for end in ends:
@@ -108,7 +97,7 @@ class OwnedProcess:
         return self._running().pid
 
     def freeze(self) -> None:
-        """Suspend the process; `thaw` resumes it. POSIX only."""
+        """Suspend the process; `thaw` resumes it."""
         os.kill(self.pid, signal.SIGSTOP)
 
     def thaw(self) -> None:
@@ -129,8 +118,7 @@ class OwnedProcess:
         if process is None:
             return
         if process.poll() is None:
-            if hasattr(signal, "SIGCONT"):
-                process.send_signal(signal.SIGCONT)  # a frozen process acts on nothing else
+            process.send_signal(signal.SIGCONT)  # a frozen process acts on nothing else
             process.terminate()
             try:
                 process.wait(_END_TIMEOUT)
@@ -165,8 +153,7 @@ class Lifeline:
         self._starting = True
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._watch, name="coneskin lifeline", daemon=True)
-        if sys.platform != "win32":  # it has no poll; there the process looks for itself
-            self._thread.start()
+        self._thread.start()
 
     def hold(self) -> None:
         """Let the parent's end be the end of the channel from now on: this process looks for it, and acts first."""
@@ -196,13 +183,6 @@ def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Chann
     Args:
         parent: position of the channel to the parent.
     """
-    if arguments == ["shared"]:
-        stream = sys.stdin.buffer
-        shares = []
-        while head := stream.read(_LENGTH_FIELD.size):
-            shares.append(stream.read(_LENGTH_FIELD.unpack(head)[0]))
-        channels = [Channel(socket.fromshare(share)) for share in shares]  # type: ignore[attr-defined,unused-ignore]
-        return Lifeline(channels[parent], None), channels
     count, *numbers = map(int, arguments)
     channels = [Channel(socket.socket(fileno=number)) for number in numbers[:count]]
     return Lifeline(channels[parent], numbers[count] if len(numbers) > count else None), channels

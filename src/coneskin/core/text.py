@@ -78,11 +78,7 @@ def printable(text: str) -> str:
     """Return a text with its control characters written out; line feeds stay."""
     if text.isprintable():
         return text
-    return "".join(letter if letter.isprintable() or letter == "\n" else _written_out(letter) for letter in text)
-
-
-def _written_out(letter: str) -> str:
-    return letter.encode("unicode_escape").decode("ascii")
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def positive_seconds(text: str) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
+import queue
 import sys
 import threading
 import time
@@ -236,49 +237,36 @@ class _EventDelivery:
     def __init__(self, on_event: Callable[[GuardEvent], None], bound: int = _MAX_WAITING) -> None:
         self._on_event = on_event
         self._bound = bound
-        self._waiting: deque[GuardEvent] = deque()
+        self._waiting: queue.SimpleQueue[GuardEvent | None] = queue.SimpleQueue()  # None: the end
         self._dropped = 0
-        self._closed = False
-        self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._run, name="coneskin events", daemon=True)
         self._thread.start()
 
     def put(self, events: Iterable[GuardEvent]) -> None:
         """Take events without waiting."""
-        with self._changed:
-            for event in events:
-                if len(self._waiting) >= self._bound:
-                    self._dropped += 1
-                    continue
-                if self._dropped:
-                    self._waiting.append(self._gap(event.time))
-                self._waiting.append(event)
-            self._changed.notify()
+        for event in events:
+            if self._waiting.qsize() >= self._bound:
+                self._dropped += 1
+                continue
+            self._tell_gap(event.time)
+            self._waiting.put(event)
 
     def close(self) -> None:
         """Deliver what waits, for 2 s at most, and end; may be called again, and by the function itself."""
-        with self._changed:
-            if self._dropped and not self._closed:
-                self._waiting.append(self._gap(time.monotonic()))
-            self._closed = True
-            self._changed.notify()
+        self._tell_gap(time.monotonic())
+        self._waiting.put(None)
         if threading.current_thread() is not self._thread:
             self._thread.join(_CLOSE_TIMEOUT)
 
-    def _gap(self, now: float) -> GuardEvent:
-        what = f"on_event was busy: {self._dropped} events were not delivered to it; the recording has them"
-        self._dropped = 0
-        logging.getLogger("coneskin").warning(what)
-        return GuardEvent(EventName.MESSAGE, now, {"what": what})
+    def _tell_gap(self, now: float) -> None:
+        if self._dropped:
+            what = f"on_event was busy: {self._dropped} events were not delivered to it; the recording has them"
+            self._dropped = 0
+            logging.getLogger("coneskin").warning(what)
+            self._waiting.put(GuardEvent(EventName.MESSAGE, now, {"what": what}))
 
     def _run(self) -> None:
-        while True:
-            with self._changed:
-                while not self._waiting and not self._closed:
-                    self._changed.wait()
-                if not self._waiting:
-                    return
-                event = self._waiting.popleft()
+        while (event := self._waiting.get()) is not None:
             try:
                 self._on_event(event)
             except Exception:
@@ -370,13 +358,9 @@ def prune_run(path: Path, around: float = AROUND, progress: Progress = silent) -
     return recording.size, sum(part.stat().st_size for part in parts)
 
 
-def _prune_part(path: Path, around: float = AROUND) -> Iterator[None]:
-    """Drop the same from one file of a recording that goes on, step by step.
-
-    Raises:
-        RecordingError: it cannot be read.
-    """
-    yield from prune_file(path, _windows(read_recording(path), around), _KEPT_KINDS)
+def _prune_part(path: Path) -> Iterator[None]:
+    """Drop the same from one file of a recording that goes on, step by step; errors as of ``prune_run``."""
+    yield from prune_file(path, _windows(read_recording(path), AROUND), _KEPT_KINDS)
 
 
 def _windows(recording: Recording, around: float) -> list[tuple[float, float]]:

@@ -145,18 +145,10 @@ class EventPublisher:
             parts = urlsplit(url)
             host, port, topic = parts.hostname, parts.port, parts.path.strip("/")
             known = parts.scheme == "mqtt" or (parts.scheme in ("udp", "zmq") and not topic)
-            known = known and "+" not in topic and len(topic) <= _MAX_TOPIC
+            known = known and not parts.query and not parts.fragment and "+" not in topic and len(topic) <= _MAX_TOPIC
         except ValueError:  # a port of words, half a bracket
             host, port, known = None, None, False
-        if (
-            not known
-            or not host
-            or not port
-            or parts.query
-            or parts.fragment
-            or "+" in topic
-            or len(topic) > _MAX_TOPIC
-        ):
+        if not (known and host and port):
             raise SceneError([f"an address to publish to is {_URL_FORMS}, got {url!r}; {_URL_EXAMPLE}"], "--publish")
         try:
             family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]

@@ -82,7 +82,9 @@ class GuardMonitor:
             self._hear_watchdogs(0.0)
             if data := b"".join(channel.receive()):
                 heard_at = time.monotonic()
-                self._note_heartbeat()
+                if self.lost:  # whatever was wrong, the guard reports itself
+                    self.lost = ""
+                    self._log.report(EventName.GUARD_RESPONSIVE, what="the guard's heartbeat is back")
                 self._log.feed(data)
                 if heard_at >= look_at:
                     look_at = math.inf
@@ -107,12 +109,6 @@ class GuardMonitor:
     def _is_active(self) -> bool:
         """Tell whether the guard has become active and has not begun to end."""
         return self._log.activated and not self._log.ending
-
-    def _note_heartbeat(self) -> None:
-        """Note that the heartbeat is back: whatever was wrong, the guard reports itself."""
-        if self.lost:
-            self.lost = ""
-            self._log.report(EventName.GUARD_RESPONSIVE, what="the guard's heartbeat is back")
 
     def _hear_watchdogs(self, timeout: float) -> None:
         """Wait for reports of the guard watchdogs, or for the timeout [s], and note them."""

@@ -170,7 +170,8 @@ def find_defects(
             covered, since = extent.following, extent.until
     closed = bool(order) and any(extent.following == covered and extent.last_kinds & _END_BIT for extent in order)
     tail = _Hole(covered, None, since, math.inf)
-    known = _Holes(holes)
+    firsts = [hole.first for hole in holes]
+    by_first, by_following = {hole.first: hole for hole in holes}, {hole.following: hole for hole in holes}
     highest = 0
     followings = [0, *(extent.following for extent in extents)]
     comings = [*(extent.first for extent in extents), None]
@@ -180,9 +181,14 @@ def find_defects(
                 defects.append(_misplaced(DefectKind.DISORDER, extent))
             highest = max(highest, extent.following)
     for path, before, damage in damages:
-        hole = known.of(damage, followings[before], comings[before], run)
+        number = _number(damage, run)
+        if number < 0:
+            hole = by_first.get(followings[before]) or by_following.get(comings[before])
+        else:
+            at = bisect_right(firsts, number) - 1
+            hole = holes[at] if at >= 0 and number < (holes[at].following or number + 1) else None
         at_end = followings[before] == covered and comings[before] is None
-        if hole is None and not closed and (at_end or _number(damage, run) >= covered):
+        if hole is None and not closed and (at_end or number >= covered):
             hole = tail
         if hole is not None:
             hole.feed(path, damage)
@@ -240,27 +246,3 @@ class _Hole:
             _kinds_of(self.kinds) if all_known else None,
             "" if self.path is None else self.path.name,
         )
-
-
-class _Holes:
-    """Holes by their numbers and by their neighbours."""
-
-    def __init__(self, holes: Sequence[_Hole]) -> None:
-        self._firsts = [hole.first for hole in holes]
-        self._holes = holes
-        self._by_first = {hole.first: hole for hole in holes}
-        self._by_following = {hole.following: hole for hole in holes}
-
-    def of(self, damage: Damage, before: int, after: int | None, run: int) -> _Hole | None:
-        """Return the hole that damaged bytes stand in; None where they stand in none.
-
-        Args:
-            before: the number that would follow the chunk before them.
-            after: the number of the chunk after them.
-        """
-        number = _number(damage, run)
-        if number < 0:
-            return self._by_first.get(before) or self._by_following.get(after)
-        at = bisect_right(self._firsts, number) - 1
-        hole = self._holes[at] if at >= 0 else None
-        return hole if hole is not None and number < (hole.following or number + 1) else None

@@ -196,7 +196,6 @@ class RecordingTail:
 
     Attributes:
         ended: the recording was closed: nothing more will come.
-        damaged: bytes that were passed over, because they are no intact chunk.
 
     Raises:
         RecordingError: there is no such file, or it is no recording.
@@ -205,7 +204,6 @@ class RecordingTail:
     def __init__(self, path: Path, keep: float, always: frozenset[int]) -> None:
         self.path = path
         self.ended = False
-        self.damaged = 0
         self._keep, self._always = keep, bits(always)
         self._part, self._offset = 0, FILE_HEAD_SIZE
         file = self._open(0)
@@ -249,7 +247,6 @@ class RecordingTail:
                     yield piece
                 elif piece.end < size or following is not None:
                     self._offset = piece.end
-                    self.damaged += piece.end - piece.offset
                 # else it may be a chunk that is not whole yet
             if following is None:
                 return

@@ -56,7 +56,6 @@ class Extent:
         run: number of the recording.
         first: number of the first chunk.
         following: number of the chunk that must come next.
-        blocks: in all of them.
         kinds: of them, as bits.
         since: the smallest time [s, host clock].
         until: the largest.
@@ -69,7 +68,6 @@ class Extent:
     run: int
     first: int
     following: int
-    blocks: int
     kinds: int
     since: float
     until: float
@@ -79,8 +77,8 @@ class Extent:
     def of(cls, path: Path, chunk: Chunk) -> Extent:
         """Return the extent of one chunk of a file."""
         head = chunk.head
-        content = head.blocks, head.kinds, head.since, head.until, head.kinds
-        return cls(path, chunk.offset, chunk.end, head.run, head.sequence, head.following, *content)
+        place = path, chunk.offset, chunk.end, head.run, head.sequence, head.following
+        return cls(*place, head.kinds, head.since, head.until, head.kinds)
 
     def takes(self, chunk: Chunk) -> bool:
         """Take a chunk that follows; False where it does not, or the extent is long enough."""
@@ -90,7 +88,6 @@ class Extent:
         if chunk.end - self.offset > _EXTENT_SIZE:
             return False
         self.end, self.following, self.last_kinds = chunk.end, head.following, head.kinds
-        self.blocks += head.blocks
         self.kinds |= head.kinds
         self.since, self.until = min(self.since, head.since), max(self.until, head.until)
         return True

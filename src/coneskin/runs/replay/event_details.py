@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import SequenceMatcher
 from itertools import zip_longest
 from typing import Any, NamedTuple, TypeGuard
@@ -37,29 +37,16 @@ class _Quantity(NamedTuple):
 
 
 _LENGTH_QUANTITY = _Quantity("m", 1e3, "mm", 1, "place")
-_ANGLE_QUANTITY = _Quantity("rad", 1.0 / _RAD_PER_DEG, "deg", 1, "angle")
-_SPEED_QUANTITY = _Quantity("rad_s", 1.0, "rad/s", 4, "speed")
 _RATIO_QUANTITY = _Quantity("", 1.0, "", 3, "level")
 #: name of a detail -> what it is; an unknown number is compared as a ratio of its size
 QUANTITIES: Mapping[str, _Quantity] = {
-    "u": _LENGTH_QUANTITY,
-    "point": _LENGTH_QUANTITY,
-    "line": _LENGTH_QUANTITY,
-    "progress": _LENGTH_QUANTITY,
-    "braking": _LENGTH_QUANTITY,
-    "ellipse 1": _LENGTH_QUANTITY,
-    "ellipse 2": _LENGTH_QUANTITY,
-    "radius": _LENGTH_QUANTITY,
-    "radius_deviation": _RATIO_QUANTITY,
-    "elongation": _LENGTH_QUANTITY,
+    **dict.fromkeys(("u", "point", "line", "progress", "braking", "radius", "elongation"), _LENGTH_QUANTITY),
+    **dict.fromkeys(("ellipse 1", "ellipse 2"), _LENGTH_QUANTITY),
+    **dict.fromkeys(("normal", "level", "slider", "before", "radius_deviation"), _RATIO_QUANTITY),
     "covariance": _Quantity("m2", 1e6, "mm^2", 4, "place"),
     "velocity": _Quantity("m_s", 1e3, "mm/s", 1, "place"),
-    "phi": _ANGLE_QUANTITY,
-    "normal": _RATIO_QUANTITY,
-    "level": _RATIO_QUANTITY,
-    "slider": _RATIO_QUANTITY,
-    "before": _RATIO_QUANTITY,
-    "speed": _SPEED_QUANTITY,
+    "phi": _Quantity("rad", 1.0 / _RAD_PER_DEG, "deg", 1, "angle"),
+    "speed": _Quantity("rad_s", 1.0, "rad/s", 4, "speed"),
 }
 
 
@@ -122,9 +109,6 @@ _TOLERANCE_UNITS: Mapping[str, tuple[str, float]] = {
     "time_ms": ("time", 1e-3),
     "relative": ("relative", 1.0),
 }
-assert {field for field, _ in _TOLERANCE_UNITS.values()} == {item.name for item in fields(Tolerances)}
-
-
 #: stamps and counters: they move with the event's time, or with another event that is reported itself
 _COUNTER_DETAILS = frozenset({"clock_us", "sequence", "number", "stop", "request", "count"})
 _DERIVED_DETAILS = frozenset({"point", "normal"})  # from u and phi
@@ -215,7 +199,8 @@ def _vector(key: str, quantity: _Quantity, a: Sequence[float], b: Sequence[float
         cosine = sum(x * y for x, y in zip(a, b, strict=True)) / (math.hypot(*a) * math.hypot(*b) or 1.0)
         return f"normal turned by {math.degrees(math.acos(max(-1.0, min(1.0, cosine)))):.2f} deg"
     moved = quantity.factor * math.dist(a, b)
-    return f"{key} moved by {_text(quantity, moved)}{quantity.unit and ' ' + quantity.unit}"
+    text = f"{moved:.{quantity.digits}f}" if moved >= 0.5 * 10**-quantity.digits else f"{moved:.1e}"
+    return f"{key} moved by {text}{quantity.unit and ' ' + quantity.unit}"
 
 
 def _close(quantity: _Quantity, a: float, b: float, tolerances: Tolerances) -> bool:
@@ -241,10 +226,6 @@ def _pair(quantity: _Quantity, a: float, b: float) -> str:
         unit = quantity.unit and " " + quantity.unit
         return f"{quantity.factor * a:.6g}{unit}, by {quantity.factor * (b - a):+.1e}{unit}"
     return f"{texts[0]} -> {texts[1]}{quantity.unit and ' ' + quantity.unit}"
-
-
-def _text(quantity: _Quantity, value: float) -> str:
-    return f"{value:.{quantity.digits}f}" if value >= 0.5 * 10**-quantity.digits else f"{value:.1e}"
 
 
 def event_differences(recorded: Sequence[GuardEvent], replayed: Sequence[GuardEvent], start: float) -> Iterator[str]:

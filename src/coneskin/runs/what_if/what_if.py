@@ -16,7 +16,6 @@ import statistics
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -134,28 +133,12 @@ def _recorded_labels(recorded: Decisions) -> list[_TouchLabel]:
 _LATE_TIME = 0.1  # s after the end of a touch in which the skin still relaxes
 
 
-@dataclass(frozen=True, slots=True)
-class _DetectionScore:
-    """Score of one run.
-
-    Attributes:
-        touches: that there were.
-        missed: of them, those without a contact.
-        false_alarms: contacts without a touch.
-        delays: from the beginning of each other touch to its first contact [s]; negative where it was seen before.
-    """
-
-    touches: int
-    missed: int
-    false_alarms: int
-    delays: tuple[float, ...]
-
-
-def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> _DetectionScore:
-    """Compare the contacts that a guard sees with the touches that there were.
+def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> tuple[int, int, list[float]]:
+    """Return how many touches there were, the contacts without one, and the delay of each touch that was seen [s].
 
     A contact belongs to the touch of its sensor in whose time it begins; a second one in the same touch is no false
-    alarm. A touch that begins where inputs are missing is left out.
+    alarm. A delay is negative where the touch was seen before it began. A touch that begins where inputs are missing
+    is left out.
     """
     known = decisions.until - decisions.start
     counted = [label for label in labels if label.start < known]
@@ -170,13 +153,11 @@ def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> _De
             for label in counted
             if label.sensor in ("", sensor) and label.start - label.early <= time <= label.end + _LATE_TIME
         ]
-        if not own:
+        if own:
+            first.setdefault(min(own, key=lambda one: abs(one.start - time)), time)
+        else:
             false_alarms += 1
-            continue
-        label = min(own, key=lambda one: abs(one.start - time))
-        first.setdefault(label, time)
-    delays = tuple(time - label.start for label, time in first.items())
-    return _DetectionScore(len(counted), len(counted) - len(first), false_alarms, delays)
+    return len(counted), false_alarms, [time - label.start for label, time in first.items()]
 
 
 _SEEING_TIME = 0.1  # s that a touch may take to be seen: one that begins later before the end of a run is none of it
@@ -262,8 +243,8 @@ def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel]
 
 def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel], truth: str) -> dict[str, Any]:
     comparison = compare_decisions(recorded, again)
-    score = _score_detection(again, labels)
-    delays, known = score.delays, truth != "recorded"
+    touches, false_alarms, delays = _score_detection(again, labels)
+    known = truth != "recorded"
     return {
         "same": comparison.same,
         "first_difference": str(comparison.differences[0]) if comparison.differences else None,
@@ -271,10 +252,10 @@ def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel],
         "stops": sum(event.name == EventName.STOPPING for event in again.events),
         "diverged_s": comparison.diverged,
         "moved_mm": 1e3 * comparison.farthest,
-        "touches": score.touches,
-        "missed": score.missed,
-        "false_alarms": score.false_alarms if known else 0,
-        "unlabeled": 0 if known else score.false_alarms,
+        "touches": touches,
+        "missed": touches - len(delays),
+        "false_alarms": false_alarms if known else 0,
+        "unlabeled": 0 if known else false_alarms,
         "delay_median_ms": 1e3 * statistics.median(delays) if delays else None,
         "delay_max_ms": 1e3 * max(delays) if delays else None,
     }
@@ -387,15 +368,12 @@ def _judge_in_pool(paths: Sequence[Path], variants: _Variants, jobs: int, judge:
                 yield path, rows
     except BrokenProcessPool:  # one of them has killed its process: find out which, one at a time
         for path in left:
-            yield path, _judge_alone(path, variants, judge)
-
-
-def _judge_alone(path: Path, variants: _Variants, judge: _Judge) -> Rows:
-    try:
-        with _pool(1) as pool:
-            return _rows_of(pool.submit(judge, path, variants), path, variants)
-    except BrokenProcessPool:
-        return _broken_rows(path, variants, "its process was killed: out of memory?")
+            with _pool(1) as pool:
+                try:
+                    rows = _rows_of(pool.submit(judge, path, variants), path, variants)
+                except BrokenProcessPool:
+                    rows = _broken_rows(path, variants, "its process was killed: out of memory?")
+            yield path, rows
 
 
 def _pool(jobs: int) -> concurrent.futures.ProcessPoolExecutor:
