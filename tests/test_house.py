@@ -101,7 +101,7 @@ HOT = {
     "robot/reaction": "retreat types",
     "robot/guard": "core phase arm_supervisor activation companion_monitor controller_heartbeat loop "
     "signals/contact signals/journal",
-    "robot/guard/motion": "motion_away setpoint_stream",
+    "robot/guard/motion": "setpoint_stream",
     "robot/stop": "arm_stop state_age stop_monitor",
     "robot/ur": "driver_process rtde_connection ur_rtde",
 }

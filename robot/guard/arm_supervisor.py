@@ -17,13 +17,12 @@ from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.reaction.rules import Rule, RuleSet
-from coneskin.robot.reaction.types import Done, Reaction
+from coneskin.robot.reaction.types import ArmState, Done, Reaction
 from coneskin.robot.stop.arm_stop import ArmStop
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.state_age import StateAge
 
 from .activation import ControllerNeeds
-from .motion.motion_away import MotionAway
 from .phase import Act, Cue, Phase, Supervision, transition
 from .signals.contact import Contact, TouchRecord
 from .signals.journal import TOUCH_CAUSE, EventName, Outputs, emit
@@ -35,6 +34,10 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .speed.speed_limit import SpeedLimit
 
 _PLACE_TIME: Final = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
+
+
+def _arm_state(state: ControllerState) -> ArmState:
+    return ArmState(state.time, state.q, state.qd)
 
 
 class ArmSupervisor:
@@ -91,7 +94,9 @@ class ArmSupervisor:
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
-        self._away = MotionAway(planner)
+        self._planner = planner
+        self._motion: MotionStream | None = None  # that is under way
+        self._at_touch: ArmState | None = None  # in which the cause of the newest stop was seen
         self.state_age = StateAge(limits.arm_silence)
         self._stop = ArmStop(limits, paths)
         self._reaction = reaction  # the one that is under way
@@ -196,11 +201,11 @@ class ArmSupervisor:
             else:
                 self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
             return
-        reaction, away = touches.update(contact), self._away
+        reaction, motion = touches.update(contact), self._motion
         if phase is Phase.SLOWED and reaction.kind != "slow":
             self._reaction = reaction
             self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
-        elif away.yields:
+        elif motion is not None and motion.how == "push":  # touches are what that follows
             if reaction.kind not in ("slow", "comply", self._reaction.kind):
                 self._reaction = reaction
                 self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
@@ -212,15 +217,16 @@ class ArmSupervisor:
         for contact in contacts:
             self.touch(now, contact, False, out)
         self._touches.feed(contacts, self.phase in (Phase.STOPPING, Phase.PLACING))
-        away, state = self._away, self.state
-        if self.phase is Phase.RETREATING and state is not None and contacts:
-            over = away.resisted(state, now, self._touches.contacts)
+        motion, state = self._motion, self.state
+        if motion is not None and state is not None and contacts:
+            over = motion.resisted(now, state.q, self._touches.contacts)
             if over is not None:
                 self._end_motion(now, Cue.OVER, over, out)
 
     def abandon_motion(self, now: float, why: str, out: Outputs) -> None:
         """End the motion away at a host time [s], and let none follow: it cannot be supervised any more."""
-        self._end_motion(now, Cue.ABANDONED, Done(why, self._away.progress), out)
+        if self._motion is not None:
+            self._end_motion(now, Cue.ABANDONED, Done(why, self._motion.progress), out)
 
     def fault(self, now: float, why: str, out: Outputs) -> None:
         """Stop because something is wrong, and do not move any more."""
@@ -240,7 +246,8 @@ class ArmSupervisor:
         """Take a measured state."""
         self.state = state
         stop, measured_at, phase = self._stop, self.state_age.feed(state), self.supervision.phase
-        self._away.feed(state, phase is Phase.ACTIVE and not self._touches.contacts)
+        if self._planner is not None:
+            self._planner.torque.feed(state, phase is Phase.ACTIVE and not self._touches.contacts)
         if state.stopped_by_safety or not state.powered:
             self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
         elif self.state_age.stepped:
@@ -303,7 +310,7 @@ class ArmSupervisor:
         if act is Act.STOP:
             self._begin_stop(now, StopProgram(self._reaction.deceleration), out)
             self._touches.placed = ()
-            self._away.prepare(self.state)
+            self._at_touch = None if self.state is None else _arm_state(self.state)
         elif act is Act.HALT:
             self._begin_stop(now, EndReaction(self._reaction.deceleration), out)
         self.supervision = then
@@ -322,7 +329,9 @@ class ArmSupervisor:
         else:
             self._stop.send(command, out)
         self.speed_reduction.note_stop(self._stop.used)
-        motion, state = self._away.end(out), self.state
+        motion, state, self._motion = self._motion, self.state, None
+        if motion is not None:
+            motion.end(out)
         speed = None if state is None or self.state_age.silent(now) else state.speed
         self._stop.begin(now, speed, command.deceleration)
         return motion
@@ -346,26 +355,34 @@ class ArmSupervisor:
         """Decide what the standing arm does. The place of a touch may need a while to become certain."""
         if stale := self.state_age.stale(state.time):
             self._bar(stale)
-        now, enough = self.supervision, self._stop.first_was_enough
+        now, touches = self.supervision, self._touches
         mover = "the driver" if self.internal_control else "a program"
-        bar = now.barred or ("" if enough else f"{mover} did not stop the arm")
-        decision = self._away.decide(state, self._reaction, now.may_move, bar, decide_by, self._touches, out)
-        self._reaction = decision.reaction
-        if decision.waits:
+        bar = now.barred or ("" if self._stop.first_was_enough else f"{mover} did not stop the arm")
+        wanted = now.may_move and bool(touches.placed)
+        if wanted:
+            self._reaction = touches.hardest()  # how firm it was shows by now
+            wanted = self._reaction.kind not in ("stop", "slow")
+        if wanted and not bar and not touches.all_placed and state.time < decide_by:
             self.supervision, _ = transition(now, Cue.WAITS, decide_by=decide_by)
             return
         self._stop.watch.end()
-        if decision.begun:
-            self.supervision, _ = transition(self.supervision, Cue.MOVES_AWAY)
-            self._move(state, out)
-        else:
-            self._stop.stay(state)
-            self.supervision, _ = transition(self.supervision, Cue.STAYS, decision.refusal)
-            self._latch(state, out)
+        if wanted and not bar:
+            assert self._planner is not None
+            here = _arm_state(state)
+            begun = self._planner.begin(self._reaction, self._at_touch or here, here, touches.placed, out)
+            if not isinstance(begun, str):
+                self._motion = begun
+                self.supervision, _ = transition(now, Cue.MOVES_AWAY)
+                self._move(state, out)
+                return
+            bar = begun
+        self._stop.stay(state)
+        self.supervision, _ = transition(now, Cue.STAYS, f"no retreat: {bar}" if wanted else "")
+        self._latch(state, out)
 
     def _move(self, state: ControllerState, out: Outputs) -> None:
-        if not self.supervision.barred:
-            over = self._away.update(state, self._touches.contacts, out)
+        if self._motion is not None and not self.supervision.barred:
+            over = self._motion.update(state, self._touches.contacts, out)
             if over is not None:
                 self._end_motion(state.time, Cue.OVER, over, out)
 

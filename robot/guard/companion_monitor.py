@@ -18,57 +18,6 @@ if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
 
 
-class _Heartbeats:
-    """Ages of the signs of life of several processes.
-
-    Args:
-        limits: longest silence of each process [s], by its name. One that is not named is not monitored.
-    """
-
-    def __init__(self, limits: Mapping[str, float]) -> None:
-        self._limits = dict(limits)
-        self._heard: dict[str, float] = {}
-        self.suspended = False  # the program, by the newest look
-        self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
-
-    def feed(self, process: str, now: float) -> None:
-        """Note a sign of life at a host time [s]."""
-        self._heard[process] = now
-        self._held_up.pop(process, None)
-
-    def hold_up(self, process: str, now: float, what: str) -> bool:
-        """Note that this computer does not let a process run. Return whether that is new since it was heard."""
-        new = process not in self._held_up
-        self._held_up[process] = now, what
-        return new
-
-    def forget(self, process: str) -> None:
-        """Monitor a process no longer: it is known to be gone."""
-        self._limits.pop(process, None)
-
-    def silent(self, now: float) -> dict[str, str]:
-        """Return what is wrong with each process that is silent. Empty where all are heard.
-
-        Args:
-            now: host time on the ``StallClock`` [s].
-        """
-        found = {}
-        for process, limit in self._limits.items():
-            heard = self._heard.get(process)
-            if heard is None:
-                found[process] = f"{process}: no sign of life yet"
-                continue
-            if process == _USER_PROGRAM and not self.suspended:
-                continue
-            since, what = self._held_up.get(process, (-math.inf, ""))
-            waits = now - since <= _LOOK_TIME
-            if now - heard > (max(limit, HOLD_UP_LIMIT) if waits else limit):
-                found[process] = f"{process}: {what if waits else _SILENT_WORDS[process == _USER_PROGRAM]}".format(
-                    1e3 * max(limit, HOLD_UP_LIMIT) if waits else 1e3 * limit
-                )
-        return found
-
-
 _USER_PROGRAM = "the program that guards"
 #: what is wrong with a helper that is silent, and with a program
 _SILENT_WORDS = (
@@ -103,12 +52,15 @@ class CompanionMonitor:
 
     def __init__(self, limits: MonitoringLimits, arm: ArmSupervisor | None) -> None:
         self._arm = arm
-        silences = {} if arm is None else {_USER_PROGRAM: limits.program_silence}
         self._helper = "driver" if arm is not None and arm.internal_control else "watchdog"
+        self._limits: dict[str, float] = {}  # longest silence of each process [s], by its name
         if arm is not None:
             helpers = ("driver",) if arm.internal_control else ("watchdog", "second")
-            silences |= {HELPER_NAMES[name]: limits.process_silence for name in helpers}
-        self._heartbeats = _Heartbeats(silences)
+            self._limits[_USER_PROGRAM] = limits.program_silence
+            self._limits |= {HELPER_NAMES[name]: limits.process_silence for name in helpers}
+        self._heard: dict[str, float] = {}
+        self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
+        self._suspended = False  # the program, by the newest look
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
         self._ran = False  # the driver's program, on the controller
         self._restarted_at = -math.inf
@@ -121,13 +73,15 @@ class CompanionMonitor:
 
     def hear_program(self, now: float, suspended: bool) -> None:
         """Take a look at the program that guards, at a host time [s]. Only a look shows that it is suspended."""
-        self._heartbeats.suspended = suspended
+        self._suspended = suspended
         if not suspended:
-            self._heartbeats.feed(_USER_PROGRAM, now)
+            self._heard[_USER_PROGRAM] = now
 
     def hear_helper(self, now: float, second: bool = False) -> None:
         """Note a message of the driver process, or of a guard watchdog, the ``second`` or not, at a host time [s]."""
-        self._heartbeats.feed(HELPER_NAMES["second" if second else self._helper], now)
+        process = HELPER_NAMES["second" if second else self._helper]
+        self._heard[process] = now
+        self._held_up.pop(process, None)
 
     def hold_up_helper(self, now: float, load: str, name: str) -> str:
         """Note that this computer does not let the driver process, or a guard watchdog, run at a host time [s].
@@ -141,7 +95,8 @@ class CompanionMonitor:
             a remark for people. Empty after the first since it was heard.
         """
         process = HELPER_NAMES.get(name, HELPER_NAMES[self._helper])
-        new = self._heartbeats.hold_up(process, now, _HELD_UP_WORDS % load)
+        new = process not in self._held_up
+        self._held_up[process] = now, _HELD_UP_WORDS % load
         return f"{process} waits for a processor ({load}): it may do so for {HOLD_UP_LIMIT:g} s" if new else ""
 
     def doubt_driver(self, now: float) -> None:
@@ -156,7 +111,7 @@ class CompanionMonitor:
             return
         if what in HELPER_NAMES:
             arm.backup_ready = arm.backup_ready and what == "second"
-            self._heartbeats.forget(HELPER_NAMES[what])
+            self._limits.pop(HELPER_NAMES[what], None)  # it is known to be gone
         arm.lose(_LOST_WITH_PROCESS.get(what) or arm.driver.lost_with.get(what, frozenset()), now)
 
     def restart(self, now: float, over: bool) -> None:
@@ -200,7 +155,7 @@ class CompanionMonitor:
         Args:
             now: host time on the ``StallClock`` [s].
         """
-        before, self._silent = self._silent, self._heartbeats.silent(now)
+        before, self._silent = self._silent, self._look(now)
         if not self._silent:
             return []
         helper = HELPER_NAMES[self._helper]
@@ -209,3 +164,22 @@ class CompanionMonitor:
             for process, why in self._silent.items()
             if process not in before
         ]
+
+    def _look(self, now: float) -> dict[str, str]:
+        """Return what is wrong with each process that is silent. Empty where all are heard."""
+        found = {}
+        for process, limit in self._limits.items():
+            heard = self._heard.get(process)
+            if heard is None:
+                found[process] = f"{process}: no sign of life yet"
+                continue
+            if process == _USER_PROGRAM and not self._suspended:
+                continue
+            since, what = self._held_up.get(process, (-math.inf, ""))
+            if now - since <= _LOOK_TIME:
+                limit = max(limit, HOLD_UP_LIMIT)
+            else:
+                what = _SILENT_WORDS[process == _USER_PROGRAM]
+            if now - heard > limit:
+                found[process] = f"{process}: {what.format(1e3 * limit)}"
+        return found

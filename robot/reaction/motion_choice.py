@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import TypeAlias
 
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
 from .contact_supervision import clamped, opposed
-from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
+from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, progress_of, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
@@ -47,12 +47,11 @@ class _AdmittanceMotion:
         space: the room that the arm has, or None.
 
     Attributes:
-        how: the arm leaves: "push".
         speed: of the touched point that was wanted in the last step [m/s].
         plan: of the last step, whose tracks start where the touched points were then; None where nothing pushed.
     """
 
-    how = "push"
+    how = "push"  #: the arm leaves with it
 
     def __init__(self, model: ArmModel, state: ArmState, reaction: Reaction, space: Workspace | None = None) -> None:
         self._model = model
@@ -75,7 +74,7 @@ class _AdmittanceMotion:
         reaction = self._reaction
         progress = self._progress
         if self.plan is not None:
-            progress += max(0.0, _made(self.plan, state))
+            progress += max(0.0, progress_of(self.plan, state.q))
         if not contacts:
             return Done("the touch is over", progress, complete=True)
         if not progress < reaction.distance - DISTANCE_TOLERANCE:
@@ -138,29 +137,10 @@ def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> floa
     return reaction.speed * most
 
 
-def _made(plan: RetreatPlan, state: ArmState) -> float:
-    """Return how far the touched points of a plan have come since it was made [m]; the farthest."""
-    step = retreat_step(replace(plan, reaction=replace(plan.reaction, time_budget=60.0)), state)
-    return step.progress
-
-
-class ReactionMotion(Protocol):
-    """Bounded motion away from a touch.
-
-    Attributes:
-        how: "" or "push": how the arm leaves.
-    """
-
-    how: str
-
-    def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
-        """Return what to do in this control cycle, with the current touches."""
-
-
 class _PlannedMotion:
     """Retreat along the normal of the touch. Later touches do not change it."""
 
-    how = ""
+    how = ""  #: the arm leaves by itself
 
     def __init__(self, plan: RetreatPlan) -> None:
         self._plan = plan
@@ -168,6 +148,10 @@ class _PlannedMotion:
     def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:  # noqa: ARG002
         """Return the next step."""
         return retreat_step(self._plan, state)
+
+
+#: bounded motion away from a touch
+ReactionMotion: TypeAlias = "_AdmittanceMotion | _PlannedMotion"
 
 
 def plan_reaction_motion(

@@ -20,7 +20,7 @@ from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
 from coneskin.robot.arm.kinematics import PlacedPoint, place_point
-from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.vectors import dot, minus
 from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, Workspace
 
@@ -37,19 +37,12 @@ _ROOM_TOLERANCE = 2e-3  # m of the arm's way that may be missing; its speed is b
 
 @dataclass(frozen=True, slots=True)
 class _Track:
-    """Path of one touched point.
+    """Path of one touched point."""
 
-    Attributes:
-        link: that carries it.
-        point: in the DH frame of the link [m].
-        away: unit vector that it is to move along, in the base frame.
-        start: where it was at the touch, in the base frame [m].
-    """
-
-    link: int
-    point: Vector
-    away: Vector
-    start: Vector
+    link: int  # that carries it
+    point: Vector  # in the DH frame of the link [m]
+    away: Vector  # unit vector that it is to move along, in the base frame
+    start: Vector  # where it was at the touch, in the base frame [m]
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,8 +125,8 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     q, qd = state.q, state.qd or (0.0,) * len(state.q)
     if not math.isfinite(sum(q)):
         return Done(f"joint positions must be finite, got {q} rad")
-    placed = [place_point(plan.model, q, track.link, track.point) for track in plan.tracks]
-    progress = max(_progress(track, at.point) for track, at in zip(plan.tracks, placed, strict=True))
+    placed = _placed(plan, q)
+    progress = _progress(plan, placed)
     speeds, away, damping = _solve(plan, placed, ())
     left = reaction.distance - progress
     if not left > DISTANCE_TOLERANCE:
@@ -213,8 +206,17 @@ def _solve(plan: RetreatPlan, placed: Sequence[PlacedPoint], locked: Sequence[in
     return speeds, made / len(points), damping
 
 
-def _progress(track: _Track, point: Vector) -> float:
-    return dot(minus(point, track.start), track.away)
+def _placed(plan: RetreatPlan, q: Joints) -> list[PlacedPoint]:
+    return [place_point(plan.model, q, track.link, track.point) for track in plan.tracks]
+
+
+def _progress(plan: RetreatPlan, placed: Sequence[PlacedPoint]) -> float:
+    return max(dot(minus(at.point, track.start), track.away) for track, at in zip(plan.tracks, placed, strict=True))
+
+
+def progress_of(plan: RetreatPlan, q: Joints) -> float:
+    """Return how far the touched points have come since the plan was made [m], the farthest, at joint positions."""
+    return _progress(plan, _placed(plan, q))
 
 
 def _why_not(plan: RetreatPlan, locked: Sequence[int], away: float, damping: float) -> str:

@@ -31,11 +31,7 @@ _MAX_APPROACH = 0.005  # m that a touched point may come nearer to what touched 
 
 
 class _FollowingErrorMonitor:
-    """Monitor of one reaction motion.
-
-    Args:
-        now: host time at which it begins [s].
-    """
+    """Monitor of one reaction motion, from the host time on at which it begins [s]."""
 
     def __init__(self, now: float) -> None:
         self._commanded: JointVelocity | None = None
@@ -54,11 +50,8 @@ class _FollowingErrorMonitor:
     def exceeded(self, state: ControllerState, progress: float) -> bool:
         """Take a measured state and tell whether the arm moves otherwise than commanded.
 
-        A slower motion in the same direction is within tolerance: the controller's speed slider makes it so.
-
-        Args:
-            state: as measured.
-            progress: of the motion [m].
+        A slower motion in the same direction is within tolerance: the controller's speed slider makes it so. The
+        progress is that of the motion [m].
         """
         commanded = self._commanded
         if commanded is None:
@@ -142,13 +135,10 @@ class ReactionPlanner:
         if isinstance(motion, str):
             return motion
         if self._bare is not None and reaction.bare_side == "stop":
-            toward = (
-                motion
-                if motion.how != "push"
-                else plan_reaction_motion(
-                    self._model, replace(reaction, kind="retreat"), here, here, contacts, self._workspace
-                )
-            )
+            toward: ReactionMotion | str = motion
+            if motion.how == "push":
+                away = replace(reaction, kind="retreat")
+                toward = plan_reaction_motion(self._model, away, here, here, contacts, self._workspace)
             if isinstance(toward, str):
                 return toward
             step = toward.update(here, contacts)
@@ -157,25 +147,11 @@ class ReactionPlanner:
             time = (reaction.distance - step.progress) / step.away
             if why := _bare_way(self._bare, here.q, [q + time * v for q, v in zip(here.q, step.qd, strict=True)]):
                 return why
-        return self._stream(motion, reaction, here, contacts, out)
-
-    def _stream(
-        self,
-        motion: ReactionMotion,
-        reaction: Reaction,
-        here: ArmState,
-        contacts: Sequence[ContactOnLink],
-        out: Outputs,
-    ) -> MotionStream:
-        supervision = ContactSupervision(self._model, here.q, contacts, motion.how == "push")
         program = None
         if self._watchdog_hz is not None:
             self._token += 1
             program = SetpointProgram(self._token, reaction.deceleration, self._watchdog_hz)
-        resistance = ResistanceMonitor(self._model, self.torque, motion.how == "push")
-        bare = None if reaction.bare_side == "fast" else self._bare
-        allowed = reaction.bare_side == "allowed"
-        return MotionStream(motion, supervision, self.torque, resistance, bare, allowed, here, program, out)
+        return MotionStream(motion, self._model, reaction, self.torque, self._bare, here, contacts, program, out)
 
 
 def _bare_way(bare: BareSides, q: Joints, there: Sequence[float]) -> str:
@@ -194,12 +170,12 @@ class MotionStream:
 
     Args:
         motion: what to do.
-        supervision: of the touches meanwhile.
+        model: the arm.
+        reaction: its settings.
         torque: from outside on the joints.
-        resistance: to this motion.
         bare: sides that no skin covers, or None.
-        allowed: True where they may lead, slowly.
         here: the arm as it begins.
+        contacts: the touches then.
         program: that follows the setpoints. None where the driver process does.
         out: takes commands and events.
 
@@ -211,53 +187,35 @@ class MotionStream:
     def __init__(
         self,
         motion: ReactionMotion,
-        supervision: ContactSupervision,
+        model: ArmModel,
+        reaction: Reaction,
         torque: OutsideTorque,
-        resistance: ResistanceMonitor,
         bare: BareSides | None,
-        allowed: bool,
         here: ArmState,
+        contacts: Sequence[ContactOnLink],
         program: SetpointProgram | None,
         out: Outputs,
     ) -> None:
-        self._motion = motion
-        self._supervision = supervision
-        self.progress = 0.0
-        self.how = motion.how
-        self._program = program
-        self._began = now = here.time
-        self._start = here.q
-        self._torque, self._resistance = torque, resistance
-        self._bare, self._allowed = bare, allowed
+        self._motion, self._program, self._torque = motion, program, torque
+        self.progress, self.how = 0.0, motion.how
+        self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push")
+        self._resistance = ResistanceMonitor(model, torque, self.how == "push")
+        self._bare = None if reaction.bare_side == "fast" else bare
+        self._allowed = reaction.bare_side == "allowed"  # a bare side may lead, slowly
+        self._start, self._began = here.q, here.time
         self._sent = -math.inf
         self._braking: float | None = None  # how far the touched surface went on until this began [m]
-        self._following_error = _FollowingErrorMonitor(now)
-        emit(out, EventName.RETREATING, now, **self.details)
-
-    @property
-    def details(self) -> dict[str, str]:
-        """Details that the events of this motion carry on how the arm moves away."""
-        return {"how": self.how} if self.how else {}
+        self._following_error = _FollowingErrorMonitor(here.time)
+        self._details = {"how": self.how} if self.how else {}
+        emit(out, EventName.RETREATING, here.time, **self._details)
 
     def resisted(self, now: float, q: Joints, contacts: Sequence[ContactOnLink]) -> Done | None:
-        """Return Done where a touch shows that the motion must end.
-
-        Args:
-            now: host time [s].
-            q: measured joint positions [rad].
-            contacts: the touches there are, by the newest frame of each.
-        """
+        """Return Done where the newest frame of a touch, of a host time [s], shows that the motion must end."""
         why = self._supervision.resistance(now, q, contacts)
         return Done(why, self.progress) if why else None
 
     def update(self, state: ControllerState, contacts: Sequence[ContactOnLink], out: Outputs) -> Done | None:
-        """Go on, or return Done where the motion is over.
-
-        Args:
-            state: as measured.
-            contacts: the touches there are now.
-            out: takes commands and events.
-        """
+        """Go on from a measured state and the touches there are now, or return Done where the motion is over."""
         torque = self._torque
         step = self._motion.update(ArmState(state.time, state.q, state.qd, torque.now, torque.spread), contacts)
         self.progress = step.progress
@@ -310,7 +268,7 @@ class MotionStream:
 
     def report(self, now: float, over: Done, out: Outputs) -> str:
         """Report the end of the motion at a host time [s], and return it in words."""
-        details = {"progress": over.progress, "complete": over.complete, "why": over.reason, **self.details}
+        details = {"progress": over.progress, "complete": over.complete, "why": over.reason, **self._details}
         if over.progress < 0.0:
             details["braking"] = self._braking
         emit(out, EventName.RETREATED, now, **details)

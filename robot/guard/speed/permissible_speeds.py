@@ -9,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from operator import mul
+from operator import itemgetter, mul
 
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_motion
@@ -74,10 +74,11 @@ class SurfaceSpeeds:
     def __init__(self, model: ArmModel, speeds: PermissibleSpeeds) -> None:
         self._speeds = speeds
         self._model = model
-        self._links = [
-            (link, [_Row(patch) for patch in speeds.patches if patch.link == link])
-            for link in sorted({patch.link for patch in speeds.patches if patch.link > 0})
-        ]
+        rows: dict[int, list[tuple[PermissiblePatch, tuple[float, ...]]]] = {}
+        for patch in speeds.patches:  # its weights make its speed of the velocity and the turning of its link
+            if patch.link > 0:
+                rows.setdefault(patch.link, []).append((patch, (*patch.normal, *cross(patch.point, patch.normal))))
+        self._links = sorted(rows.items(), key=itemgetter(0))
 
     def ratio(self, q: Sequence[float], qd: Sequence[float]) -> tuple[float, str]:
         """Return the highest speed of a patch over what is permissible, and the patch's sensor.
@@ -94,22 +95,14 @@ class SurfaceSpeeds:
         for link, rows in self._links:
             velocity, turn = link_motion(self._model, q, qd, link)
             flow = *velocity, *turn
-            for row in rows:
-                speed = speeds.between * sum(map(mul, row.weights, flow))
+            for patch, weights in rows:
+                speed = speeds.between * sum(map(mul, weights, flow))
                 if speed > 0.0:
-                    curve = row.patch.curve if inside else row.patch.any_curve
+                    curve = patch.curve if inside else patch.any_curve
                     ratio = speed / max(1e-6, _interpolate(speeds.levers, curve, speed / leading))
                     if ratio > worst:
-                        worst, name = ratio, row.patch.name
+                        worst, name = ratio, patch.name
         return worst, name
-
-
-class _Row:
-    """Patch with the weights that make its speed along the normal of the velocity and the turning of its link."""
-
-    def __init__(self, patch: PermissiblePatch) -> None:
-        self.patch = patch
-        self.weights = (*patch.normal, *cross(patch.point, patch.normal))
 
 
 def _interpolate(levers: Sequence[float], curve: Sequence[float], lever: float) -> float:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.model import ArmModel
@@ -30,87 +31,55 @@ _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its set
 _MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
 
 
+@dataclass(slots=True)
 class _ReducedSpeedTouch:
-    """One touch during which the arm is slow.
+    """One touch during which the arm is slow."""
 
-    Args:
-        now: when it began [s].
-        top: largest speed of the touched surface in a touch just before [m/s]. First where its place was not certain,
-            so that it was a bound, then where it was.
-        before: where the slider was.
-        fraction: where it is to be.
-        budget: within which the arm must be slower [s].
-        longest: that the touch may last [s].
-        slow: speed of the surface below which the arm counts as slow [m/s].
-
-    Attributes:
-        before: where the slider was.
-        fraction: where it is to be.
-        top: largest speeds around the touch, as above.
-    """
-
-    def __init__(
-        self,
-        now: float,
-        top: Sequence[float],
-        before: float,
-        fraction: float,
-        budget: float,
-        longest: float,
-        slow: float,
-    ) -> None:
-        self.before = before
-        self.fraction = min(before, fraction)
-        self.top = list(top)
-        self._slow = slow
-        self._deadline = now + budget
-        self._end = now + longest
-        self._free_since: float | None = None
-        self._fast = 0  # samples in a row
+    #: largest speeds of the touched surface around it [m/s]: where its place was not certain, so that it was a bound,
+    #: and where it was
+    top: list[float]
+    before: float  # where the slider was
+    fraction: float  # where it is to be
+    deadline: float  # by when the arm must be slower [s]
+    end: float  # until when the touch may last [s]
+    slow: float  # speed of the surface below which the arm counts as slow [m/s]
+    free_since: float | None = None
+    fast: int = 0  # samples in a row
 
     def sample(self, time: float, speed: float, certain: bool = True) -> None:
         """Take the measured speed of the touched surface at a time [s, m/s]. ``certain`` where it is no bound."""
         top = self.top
-        if time < self._deadline and speed > top[certain]:
+        if time < self.deadline and speed > top[certain]:
             top[certain] = speed  # it may still have been speeding up
-        self._fast = self._fast + 1 if speed > max(_MAX_SPEED_RATIO * top[certain], self._slow) else 0
+        self.fast = self.fast + 1 if speed > max(_MAX_SPEED_RATIO * top[certain], self.slow) else 0
 
     def touched(self, now: float, touched: bool) -> None:
         """Say whether anything touches."""
         if touched:
-            self._free_since = None
-        elif self._free_since is None:
-            self._free_since = now
+            self.free_since = None
+        elif self.free_since is None:
+            self.free_since = now
 
     def trouble(self, now: float, slider: float | None) -> str:
-        """Return why the arm has to be stopped after all. Empty where it has not.
-
-        Args:
-            now: [s].
-            slider: where it is.
-        """
-        if now >= self._deadline:
-            if self._fast >= STANDSTILL_SAMPLES:
+        """Return why the arm has to be stopped after all, by where the slider is. Empty where it has not."""
+        if now >= self.deadline:
+            if self.fast >= STANDSTILL_SAMPLES:
                 return "the arm did not become slower"
-            if self._free_since is None and slider is not None and slider > self.fraction + _SLIDER_TOLERANCE:
+            if self.free_since is None and slider is not None and slider > self.fraction + _SLIDER_TOLERANCE:
                 return f"the speed slider is at {slider:.0%} again while the skin is touched"
-        if self._free_since is None and now >= self._end:
+        if self.free_since is None and now >= self.end:
             return "the touch lasts too long"
         return ""
 
     def puts_back(self, slider: float | None) -> bool:
-        """Tell whether the slider is where it was set, or not yet seen there, so that no person has moved it since.
-
-        Args:
-            slider: where it is.
-        """
+        """Tell whether the slider is where it was set, or not yet seen there, so that no person has moved it since."""
         if slider is None:
             return False
         return min(abs(slider - self.fraction), abs(slider - self.before)) <= _SLIDER_TOLERANCE
 
     def over(self, now: float) -> bool:
         """Tell whether the arm may go on as before."""
-        return self._free_since is not None and now - self._free_since >= CLEAR_TIME
+        return self.free_since is not None and now - self.free_since >= CLEAR_TIME
 
 
 class SpeedReduction:
@@ -168,13 +137,13 @@ class SpeedReduction:
         """Reduce the speed. Return False where the arm has to be stopped instead.
 
         That is where it moves into the touch too fast, or where the position of the slider, or the state of the arm, is
-        not known.
+        not known. The arm has the time of a stop to become slower.
 
         Args:
             time: host time [s].
             state: of the arm, the newest.
             reaction: its kind is "slow".
-            limits: of the monitoring. The arm has the time of a stop to become slower.
+            limits: of the monitoring.
             contacts: the touches there are.
             out: takes commands and events.
         """
@@ -187,12 +156,12 @@ class SpeedReduction:
             return False
         if self._last is not None and time - self._last[0] < CLEAR_TIME:  # slider and speed may not yet be as before
             last = self._last[1]
-            top = last.top
+            top = list(last.top)
             if last.puts_back(before):  # else a person has moved it since
                 before = last.before
-        budget = limits.stop_budget(state.speed, reaction.deceleration)
-        longest, slow = reaction.time_budget, reaction.slow_speed
-        self.now = _ReducedSpeedTouch(time, top, before, reaction.slow_to, budget, longest, slow)
+        deadline, end = time + limits.stop_budget(state.speed, reaction.deceleration), time + reaction.time_budget
+        fraction = min(before, reaction.slow_to)
+        self.now = _ReducedSpeedTouch(top, before, fraction, deadline, end, reaction.slow_speed)
         torque = self._torque_of(self._model)
         self._resistance = torque, self._monitor_of(self._model, torque, True, self._tolerance)
         self.approach, self._held = approach, ""

@@ -7,12 +7,13 @@ import pytest
 from coneskin.robot.driver.messages import Release, StatusReport, StopProgram
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard import companion_monitor
-from coneskin.robot.guard.companion_monitor import _Heartbeats
+from coneskin.robot.guard.companion_monitor import CompanionMonitor
 from coneskin.robot.guard.core import _StallClock
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, stopping_contact
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
+from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from tests.support.guard_rig import GuardRig, touch
 from tests.support.sweep import sweep
@@ -63,18 +64,30 @@ def test_a_frozen_process_is_a_fault_although_nobody_needs_it_and_another_path_s
         assert rig.event("escalated").time - rig.event("stopping").time < 0.003
 
 
+def companions():
+    """A monitor that misses the driver process after 150 ms."""
+    monitor = CompanionMonitor(MonitoringLimits(program_silence=0.1125), GuardRig().core._arm)
+    monitor.hear_program(0.0, suspended=False)
+    return monitor
+
+
+def silent(monitor, now):
+    monitor.poll(now)
+    return list(monitor.blockers)
+
+
 def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
-    monitor, clock = _Heartbeats({"it": 0.15}), _StallClock()
-    monitor.feed("it", 1.0)
-    assert monitor.silent(clock.fair(1.0)) == {}
-    assert monitor.silent(clock.fair(1.5)) == {}  # its heartbeats wait to be read
+    monitor, clock = companions(), _StallClock()
+    monitor.hear_helper(1.0)
+    assert silent(monitor, clock.fair(1.0)) == []
+    assert silent(monitor, clock.fair(1.5)) == []  # its heartbeats wait to be read
     for step in range(1, 150):
-        assert monitor.silent(clock.fair(1.5 + 0.001 * step)) == {}
-    assert monitor.silent(clock.fair(1.652))
-    monitor.feed("it", 1.653)
-    assert monitor.silent(clock.fair(1.653)) == {}
-    monitor.forget("it")
-    assert monitor.silent(clock.fair(3.0)) == {}
+        assert silent(monitor, clock.fair(1.5 + 0.001 * step)) == []
+    assert silent(monitor, clock.fair(1.652))
+    monitor.hear_helper(1.653)
+    assert silent(monitor, clock.fair(1.653)) == []
+    monitor.lose("driver", 1.653)
+    assert silent(monitor, clock.fair(3.0)) == []
 
 
 def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
@@ -90,16 +103,16 @@ def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
 @pytest.mark.promise("P48")
 def test_a_guard_that_is_held_up_again_and_again_notices_silence():
     """Held up for 30 ms after each 3 ms it took 1.3 s, and a frozen program's arm moved on by 64 deg."""
-    monitor, clock = _Heartbeats({"it": 0.15}), _StallClock()
-    monitor.feed("it", 0.0)
+    monitor, clock = companions(), _StallClock()
+    monitor.hear_helper(0.0)
     now = 0.0
-    while not monitor.silent(clock.fair(now)):
+    while not silent(monitor, clock.fair(now)):
         now += 0.03
-        if not monitor.silent(clock.fair(now)):
+        if not silent(monitor, clock.fair(now)):
             now += 0.003
     assert 0.15 < now < 0.15 + 0.03 + 0.034
-    monitor.feed("it", now)
-    assert not monitor.silent(clock.fair(now))
+    monitor.hear_helper(now)
+    assert not silent(monitor, clock.fair(now))
 
 
 @pytest.mark.promise("P40")

@@ -16,7 +16,7 @@ SLOW = 0.05  # m/s
 
 
 def slowing(speed=1.0, before=1.0, fraction=0.2):
-    return _ReducedSpeedTouch(10.0, (speed, speed), before, fraction, 0.2, 1.0, SLOW)
+    return _ReducedSpeedTouch([speed, speed], before, min(before, fraction), 10.2, 11.0, SLOW)
 
 
 def fast(one, time, speed):
