@@ -20,6 +20,7 @@ from coneskin.robot.guard.loop import GuardLoop, GuardPorts
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
 from coneskin.robot.guard.signals.journal import BlockKind
+from coneskin.robot.reaction.rules import RuleSet
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur.driver import UR_DRIVER
@@ -147,7 +148,7 @@ def make_core() -> GuardCore:
     settings = DetectorSettings(timing=TimingLimits(late=SKIN_TIMEOUT))
     cone = PlacedFrustum(SENSOR.frustum)
     placed = GuardedSensor(SENSOR.name, "forearm", 3, lambda u, phi: (cone.point(u, phi), cone.normal(phi)))
-    arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, Reaction(kind="stop"), limits, (StopPath.DRIVER,))
+    arm = ArmSupervisor(arm_model("UR5e"), UR_DRIVER, RuleSet(Reaction(kind="stop")), limits, (StopPath.DRIVER,))
     return GuardCore(TouchStream([SENSOR], settings), [placed], limits, arm)
 
 

@@ -221,29 +221,21 @@ _TUBE_OFFSETS = {
     "UR5": (0.13585, 0.0165, -0.093, -0.095, -0.0818, 0.0),
     "UR10": (0.220941, 0.049042, -0.1149, -0.1158, -0.0922, 0.001),
     "UR3e": (0.120, 0.027, -0.104, -0.08535, -0.0921, 0.0),
-    "UR5e": (0.138, 0.007, -0.127, -0.0997, -0.0989, -0.0005),
-    "UR7e": (0.138, 0.007, -0.127, -0.0997, -0.0989, -0.0005),
-    "UR10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005),
-    "UR12e": (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005),
-    "UR16e": (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005),
-    "UR20": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
-    "UR30": (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0),
+    **dict.fromkeys(("UR5e", "UR7e"), (0.138, 0.007, -0.127, -0.0997, -0.0989, -0.0005)),
+    **dict.fromkeys(("UR10e", "UR12e", "UR16e"), (0.1762, 0.0393, -0.135, -0.12, -0.1168, -0.0005)),
+    **dict.fromkeys(("UR20", "UR30"), (0.260, 0.043, -0.0775, -0.0749, -0.07, 0.0)),
 }
 
 _MAX_LINKS = 100  # of any arm
 MESHED_ARMS = frozenset(_TUBE_OFFSETS)  #: arms of which it is known where the meshes of their links lie
 
 _QUARTER_TURN = math.pi / 2.0  # rad
-_ALONG_THE_ARM = (_QUARTER_TURN, 0.0, -_QUARTER_TURN)  # upper arm and forearm: the mesh's z axis runs along the link
 #: link -> roll, pitch and yaw of its mesh in the URDF frame [rad]
 _TURNED_FRAME = {
-    "base": (0.0, 0.0, math.pi),
-    "shoulder": (0.0, 0.0, math.pi),
-    "upper_arm": _ALONG_THE_ARM,
-    "forearm": _ALONG_THE_ARM,
-    "wrist_1": (_QUARTER_TURN, 0.0, 0.0),
+    **dict.fromkeys(("base", "shoulder"), (0.0, 0.0, math.pi)),
+    **dict.fromkeys(("upper_arm", "forearm"), (_QUARTER_TURN, 0.0, -_QUARTER_TURN)),  # its z axis runs along the link
+    **dict.fromkeys(("wrist_1", "wrist_3"), (_QUARTER_TURN, 0.0, 0.0)),
     "wrist_2": (0.0, 0.0, 0.0),
-    "wrist_3": (_QUARTER_TURN, 0.0, 0.0),
 }
 
 
@@ -315,7 +307,7 @@ def dh_link(model: ArmModel, link: str) -> Pose:
     start = 0.0 if name == "upper_arm" else _crossing(model, 1, 0.0)[1]
     angle, _ = _crossing(model, index - 1, start)
     # the URDF frame is at the link's start, turned so that its -x axis points at where the next axis crosses
-    return _passive(model, index - 1, model.d[index - 1] - start).inverse() @ _about_z(angle)
+    return _passive(model, index - 1, model.d[index - 1] - start).inverse() @ Pose.from_xyz_rpy(rpy=(0.0, 0.0, angle))
 
 
 def dh_mesh(model: ArmModel, link: str) -> Pose:
@@ -348,8 +340,3 @@ def _passive(model: ArmModel, i: int, d: float) -> Pose:
     """Return Tz(d) Tx(a) Rx(alpha) of a row of the DH table."""
     c, s = cos_sin(model.alpha[i])
     return Pose(((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c)), (model.a[i], 0.0, d))
-
-
-def _about_z(angle: float) -> Pose:
-    c, s = math.cos(angle), math.sin(angle)
-    return Pose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))

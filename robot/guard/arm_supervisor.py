@@ -16,8 +16,8 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import ControllerState, StopPath
-from coneskin.robot.reaction.rules import Rule, RuleSet
-from coneskin.robot.reaction.types import ArmState, Done, Reaction
+from coneskin.robot.reaction.rules import RuleSet
+from coneskin.robot.reaction.types import ArmState, Done
 from coneskin.robot.stop.arm_stop import ArmStop
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.state_age import StateAge
@@ -46,11 +46,10 @@ class ArmSupervisor:
     Args:
         model: the arm.
         driver: of the arm's controller.
-        reaction: what the arm does when it is touched and no rule fits.
+        rules: what the arm does when it is touched.
         limits: of the monitoring.
         paths: the stop paths that there are. The first is used for every stop, the others where it does not work.
             Without DRIVER, what moves the arm is not known here.
-        rules: reactions with conditions.
         planner: of motions away from a touch. None where no reaction moves the arm.
         heartbeat: supervision of the program that moves the arm. None where that is the driver process.
         speed_limit: of the skins' surfaces. None where nothing limits them.
@@ -72,10 +71,9 @@ class ArmSupervisor:
         self,
         model: ArmModel,
         driver: ArmDriver,
-        reaction: Reaction,
+        rules: RuleSet,
         limits: MonitoringLimits,
         paths: tuple[StopPath, ...],
-        rules: tuple[Rule, ...] = (),
         planner: ReactionPlanner | None = None,
         heartbeat: ControllerHeartbeat | None = None,
         speed_limit: SpeedLimit | None = None,
@@ -87,8 +85,8 @@ class ArmSupervisor:
         self.heartbeat = heartbeat
         self.internal_control = StopPath.DRIVER in paths
         self.model = model
-        self._rules = RuleSet(reaction, rules)
-        self._touches = TouchRecord(self._rules)
+        self._rules = rules
+        self._touches = TouchRecord(rules)
         self._speed_limit = speed_limit
         self.speed_reduction = SpeedReduction(model, self._needs_slider)
         if planner is None and self._rules.move:
@@ -99,7 +97,7 @@ class ArmSupervisor:
         self._at_touch: ArmState | None = None  # in which the cause of the newest stop was seen
         self.state_age = StateAge(limits.arm_silence)
         self._stop = ArmStop(limits, paths)
-        self._reaction = reaction  # the one that is under way
+        self._reaction = rules.default  # the one that is under way
         self._sent = False  # the stop for a touch whose event comes next
 
     @property

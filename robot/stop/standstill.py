@@ -7,6 +7,8 @@ system holds it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.driver.values import ControllerState
 
@@ -22,85 +24,71 @@ _MAX_STARTS = 3  # of programs during one watch, from which on a loop starts the
 _MAX_RESTARTS = 2  # motions of a stopped arm, from which on it is stopped by the strongest path; touched, one is enough
 
 
-class _StandstillMonitor:
-    """Monitor of one arm from its standstill on. A person who jogs or pushes the arm is left alone: no program runs.
+@dataclass(frozen=True, slots=True)
+class _Standstill:
+    """One standstill, as far as it was measured."""
 
-    What programs have moved it is summed, so that one which is started anew again and again gets no farther.
+    until: float  # host time from which on it is confirmed [s]
+    duration: float  # until then, from the newest start of a program on [s]
+    confirmed: bool
+    q: Joints = ()  # as measured last
+    ran: bool = True  # a program, then; at first the program of the stop may
+    starts: int = 0  # of programs
+    moving: int = 0  # samples in a row in which one moves the arm
+    drift: Joints = ()  # of each joint, by programs [rad]
+    touched_drift: Joints = ()  # the part of it while touched
 
-    Args:
-        standstill: joint speed below which the arm stands [rad/s].
-        crept: what programs have moved the touched arm before this standstill, summed over the joints [rad].
+    @property
+    def crept(self) -> float:
+        """Drift while touched, summed over the joints [rad]."""
+        return sum(map(abs, self.touched_drift))
 
-    Attributes:
-        crept: the same until now.
-    """
-
-    def __init__(self, standstill: float, crept: float = 0.0) -> None:
-        self._standstill = standstill
-        self._before = crept
-        self.crept = crept
-        self._q: Joints | None = None  # as measured last
-        self._ran = False
-        self._drift: list[float] = []  # by programs
-        self._touched_drift: list[float] = []  # the part of it while touched
-        self._moving = 0  # samples in a row
-
-    def moved(self, state: ControllerState, touched: bool) -> bool:
-        """Take a measured state and tell whether a program moves the arm.
-
-        Args:
-            state: as measured.
-            touched: True while anything touches the skin.
-        """
-        last, ran = self._q, self._ran
-        self._q, self._ran = state.q, state.program_running
-        if not state.program_running:
-            self._moving = 0
-        if last is None or not (state.program_running or ran):  # a program's last step belongs to it
-            return False
-        self._moving = self._moving + 1 if state.speed > (self._standstill if touched else _MAX_SPEED) else 0
-        if not self._drift:
-            self._drift, self._touched_drift = [0.0] * len(last), [0.0] * len(last)
-        for i, (now, before) in enumerate(zip(state.q, last, strict=True)):
-            self._drift[i] += now - before
+    def after(self, state: ControllerState, touched: bool, standstill: float) -> _Standstill:
+        """Return it with one more measured state. An arm stands below the speed ``standstill`` [rad/s]."""
+        running, starts, until = state.program_running, self.starts, self.until
+        moving, drift, touched_drift = self.moving if running else 0, self.drift, self.touched_drift
+        if self.q and (running or self.ran):  # a program's last step belongs to it
+            moving = moving + 1 if state.speed > (standstill if touched else _MAX_SPEED) else 0
+            step = [now - before for now, before in zip(state.q, self.q, strict=True)]
+            drift = tuple([a + b for a, b in zip(drift or (0.0,) * len(step), step, strict=True)])
             if touched:
-                self._touched_drift[i] += now - before
-        here = sum(map(abs, self._touched_drift))
-        self.crept = self._before + here
-        return (
-            self._moving >= STANDSTILL_SAMPLES
-            or max(map(abs, self._drift)) > _MAX_DRIFT
-            or here > max(_POSITION_NOISE, _MAX_TOUCHED_DRIFT - self._before)
-        )
+                touched_drift = tuple([a + b for a, b in zip(touched_drift or (0.0,) * len(step), step, strict=True)])
+        if running and not self.ran and not self.confirmed:  # it has not moved the arm yet
+            starts, until = starts + 1, state.time + self.duration
+        confirmed = self.confirmed or state.stopped_by_safety or state.time >= until
+        return _Standstill(until, self.duration, confirmed, state.q, running, starts, moving, drift, touched_drift)
 
 
 class StandstillWatch:
     """Watch over the standstill of one arm, from stop to stop until a person resets it.
 
+    A person who jogs or pushes the arm is left alone: no program runs then. What programs have moved the touched arm
+    is summed, so that one which is started anew again and again gets no farther.
+
     Args:
         standstill: joint speed below which the arm stands [rad/s].
 
     Attributes:
-        confirmed: True once the arm may be called standing.
         restarts: how often a program has moved the stopped arm.
         why: what ended the newest watch.
     """
 
     def __init__(self, standstill: float) -> None:
         self._standstill = standstill
-        self._monitor: _StandstillMonitor | None = None
-        self._until = self._duration = 0.0
-        self._ran = True
-        self._crept = 0.0
-        self.confirmed = False
+        self._now: _Standstill | None = None
+        self._crept = 0.0  # before this standstill, summed over the joints [rad]
         self.restarts = 0
         self.why = ""
-        self._starts = 0
 
     @property
     def under_way(self) -> bool:
         """True from a measured standstill until something moves the arm, or may move it."""
-        return self._monitor is not None
+        return self._now is not None
+
+    @property
+    def confirmed(self) -> bool:
+        """True once the arm may be called standing."""
+        return self._now is not None and self._now.confirmed
 
     @property
     def insists(self) -> bool:
@@ -108,20 +96,15 @@ class StandstillWatch:
         return self.restarts >= _MAX_RESTARTS
 
     def begin(self, now: float, duration: float) -> None:
-        """Begin at a measured standstill [s]; after the duration [s] it is confirmed.
-
-        A program that starts meanwhile has not moved the arm yet: the duration counts from its start then.
-        """
-        self._monitor = _StandstillMonitor(self._standstill, self._crept)
-        self._until, self._duration, self.confirmed = now + duration, duration, duration <= 0.0
-        self._starts = 0
-        self._ran = True  # what runs now may be the program of the stop
+        """Begin at a measured standstill [s]; after the duration [s] it is confirmed."""
+        self.end()
+        self._now = _Standstill(now + duration, duration, duration <= 0.0)
 
     def end(self) -> None:
         """End it: the arm is stopped again, or is to move."""
-        if self._monitor is not None:
-            self._crept = self._monitor.crept
-        self._monitor, self.confirmed = None, False
+        if self._now is not None:
+            self._crept += self._now.crept
+        self._now = None
 
     def forget(self) -> None:
         """Forget what was: a person has let the arm move again."""
@@ -135,19 +118,18 @@ class StandstillWatch:
             state: as measured.
             touched: True while anything touches the skin.
         """
-        if self._monitor is None:
+        if self._now is None:
             return False
-        if self._monitor.moved(state, touched):
-            self.restarts = max(self.restarts + 1, _MAX_RESTARTS) if touched else self.restarts + 1
-            self.why = "something moved the arm"
-            self.end()
-            return True
-        if state.program_running and not self._ran and not self.confirmed:
-            self._until, self._starts = state.time + self._duration, self._starts + 1
-            if self._starts >= _MAX_STARTS:
-                self.restarts, self.why = max(self.restarts + 1, _MAX_RESTARTS), "a program started again and again"
-                self.end()
-                return True
-        self._ran = state.program_running
-        self.confirmed = self.confirmed or state.stopped_by_safety or state.time >= self._until
-        return False
+        now = self._now = self._now.after(state, touched, self._standstill)
+        moves = (
+            now.moving >= STANDSTILL_SAMPLES
+            or any(abs(way) > _MAX_DRIFT for way in now.drift)
+            or now.crept > max(_POSITION_NOISE, _MAX_TOUCHED_DRIFT - self._crept)
+        )
+        if not moves and now.starts < _MAX_STARTS:
+            return False
+        strongest = touched or not moves
+        self.restarts = max(self.restarts + 1, _MAX_RESTARTS) if strongest else self.restarts + 1
+        self.why = "something moved the arm" if moves else "a program started again and again"
+        self.end()
+        return True

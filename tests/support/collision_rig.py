@@ -25,7 +25,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
 from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
-from coneskin.robot.reaction.rules import Rule
+from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -112,7 +112,9 @@ class CollisionRig:
         self._device = PressedSkin([item.sensor for item in skins], seed=seed, model=sheets)
         self._packets = self._device.packets()
         limits = limits or MonitoringLimits()
-        supervisor = ArmSupervisor(model, UR_DRIVER, reaction, limits, INTERNAL_PATHS, rules, ReactionPlanner(model))
+        supervisor = ArmSupervisor(
+            model, UR_DRIVER, RuleSet(reaction, rules), limits, INTERNAL_PATHS, ReactionPlanner(model)
+        )
         stream = TouchStream(
             [item.sensor for item in skins], DetectorSettings(timing=TimingLimits(late=limits.skin_late))
         )

@@ -22,7 +22,7 @@ from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
 from coneskin.robot.guard.signals.joint_current import push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
-from coneskin.robot.reaction.rules import Rule
+from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -221,5 +221,5 @@ def make_core(
     ]
     paths = EXTERNAL_PATHS if external else INTERNAL_PATHS
     planner = ReactionPlanner(model, 4.0 if external else None, table) if model is MODEL else None
-    arm = ArmSupervisor(model, driver, reaction, limits, paths, rules, planner, speed_limit=speed_limit)
+    arm = ArmSupervisor(model, driver, RuleSet(reaction, rules), limits, paths, planner, speed_limit=speed_limit)
     return GuardCore(TouchStream(sensors, DetectorSettings(stuck_frames=200)), placed, limits, arm)

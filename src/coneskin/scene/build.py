@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
-    from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
     from coneskin.skin.detection.stream import TouchStream
 
@@ -92,29 +91,26 @@ def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     rules = RuleSet(scene.default_reaction, scene.rules)
     if withheld_motion(scene):
         rules = rules.without_motion()  # a mirrored or exchanged skin would retreat into the person
-    paths: tuple[StopPath, ...] = INTERNAL_PATHS if scene.arm.control == "internal" else EXTERNAL_PATHS
+    internal = scene.arm.control == "internal"
     own = frozenset({StopPath.DRIVER, StopPath.WATCHDOG}).union(*driver.lost_with.values())
-    paths = tuple(path for path in paths if path in own)
     if not scene.arm.slider_stop:
-        paths = tuple(path for path in paths if path is not StopPath.SLIDER)
-    planner = _planner(scene, arm, placed) if rules.move else None
+        own -= {StopPath.SLIDER}
+    paths = tuple(path for path in (INTERNAL_PATHS if internal else EXTERNAL_PATHS) if path in own)
+    planner = None
+    if rules.move:
+        from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
+        from coneskin.robot.reaction.bare_side import BareSides
+
+        watchdog = None if internal else scene.arm.watchdog_hz
+        bare = BareSides(arm, [(item.link, item.frustum) for item in placed])
+        planner = ReactionPlanner(arm, watchdog, scene.arm.table_z, bare)
     heartbeat = None
-    if scene.arm.control == "external" and isinstance(driver, HeartbeatDriver):
+    if not internal and isinstance(driver, HeartbeatDriver):
         from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
 
         heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
     limit = None if scene.speed_limit is None else _speed_limit(scene, scene.speed_limit, arm)
-    return ArmSupervisor(
-        arm,
-        driver,
-        rules.default,
-        scene.monitoring_limits,
-        paths,
-        rules.rules,
-        planner,
-        heartbeat,
-        limit,
-    )
+    return ArmSupervisor(arm, driver, rules, scene.monitoring_limits, paths, planner, heartbeat, limit)
 
 
 def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLimit:
@@ -145,17 +141,6 @@ def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLi
 def _angle(a: Vector, b: Vector) -> float:
     """Return the angle between two unit vectors [rad]."""
     return 2.0 * math.asin(min(1.0, 0.5 * math.dist(a, b)))
-
-
-def _planner(scene: Scene, arm: ArmModel, placed: Sequence[SensorOnArm]) -> ReactionPlanner:
-    from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
-    from coneskin.robot.reaction.bare_side import BareSides
-
-    assert scene.arm is not None
-    watchdog = scene.arm.watchdog_hz if scene.arm.control == "external" else None
-    return ReactionPlanner(
-        arm, watchdog, scene.arm.table_z, BareSides(arm, [(item.link, item.frustum) for item in placed])
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ def merge_sensor_file(table: Mapping[str, Any], where: str, folder: Path | None,
     if folder is None:
         problems.append(f"{where}.file: a recording carries the keys of its sensor files and names none, got {name}")
     elif name is not None:
-        found = _from_file(folder / name, where, problems)
+        found = read_toml(folder / name, MAX_SIZE, f"{where}.file", problems)
         problems += [
             f"{where}: {key.name} = {own[key.name]} is far from {found[key.name]:.6g}, for which the sheet of file was "
             "cut: leave it out"
@@ -204,13 +204,14 @@ def _touch_level(table: Mapping[str, Any], values: Mapping[str, Any], forces: Fo
     return forces.level(force)
 
 
-def _from_file(path: Path, where: str, problems: list[str]) -> dict[str, Any]:
+def read_toml(path: Path, limit: int, where: str, problems: list[str]) -> dict[str, Any]:
+    """Return the tables of a file that a scene names, of at most so many bytes; none where it has a mistake."""
     try:
-        return parse_toml(read_file(path, MAX_SIZE).decode("utf-8-sig"))
+        return parse_toml(read_file(path, limit).decode("utf-8-sig"))
     except OSError as exc:
-        problems.append(f"{where}.file: {path} cannot be read: {exc.strerror or exc}")
+        problems.append(f"{where}: {path} cannot be read: {exc.strerror or exc}")
     except ValueError as exc:  # not TOML, or not UTF-8
-        problems.append(f"{where}.file: {path} is not TOML: {exc}")
+        problems.append(f"{where}: {path} is not TOML: {exc}")
     return {}
 
 

@@ -16,12 +16,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check
-from coneskin.core.toml_text import parse_toml
 from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, facts_digest
 
 from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
+from .sensor_tables import read_toml
 
 if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum
@@ -81,18 +80,13 @@ def inline_speed_limit(tables: dict[str, Any], folder: Path | None, problems: li
 
 
 def _read(tables: dict[str, Any], path: Path, problems: list[str]) -> None:
-    try:
-        found = parse_toml(read_file(path, _MAX_BYTES).decode("utf-8-sig"))
-    except OSError as exc:
-        problems.append(f"arm.speed_limit_from: {path} cannot be read: {exc.strerror or exc}; {_HOW_TO}")
-        return
-    except ValueError as exc:
-        problems.append(f"arm.speed_limit_from: {path} is not TOML: {exc}")
-        return
-    if set(found) != {"speed_limit"} or not isinstance(found["speed_limit"], dict):
-        problems.append(f"arm.speed_limit_from: {path} must hold one table, [speed_limit]; {_HOW_TO}")
-        return
-    tables["speed_limit"] = found["speed_limit"]
+    lines: list[str] = []
+    found = read_toml(path, _MAX_BYTES, "arm.speed_limit_from", lines)
+    if set(found) == {"speed_limit"} and isinstance(found["speed_limit"], dict):
+        tables["speed_limit"] = found["speed_limit"]
+    elif not lines:
+        lines.append(f"arm.speed_limit_from: {path} must hold one table, [speed_limit]")
+    problems += [f"{line}; {_HOW_TO}" for line in lines]
 
 
 def with_speed_limit(scene: Scene, table: Mapping[str, Any], recorded: bool, problems: list[str]) -> Scene:
