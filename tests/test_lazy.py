@@ -147,7 +147,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "the process of the simulated arm": (
         "",
         "import coneskin.robot.sim.command",
-        {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.motion.remote_plant"},
+        {"coneskin.robot.sim.machine.controller", "coneskin.robot.sim.motion.plant"},
         HEAVY | VIRTUAL | FIELD,
     ),
     "the driver of ur_rtde": (

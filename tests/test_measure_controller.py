@@ -56,7 +56,7 @@ def test_every_assumption_is_measured_and_a_simulator_with_these_times_measures_
         "program",
         "command",
     )
-    with SimulatedController("UR5e", free_host(), start_delay=0.3) as simulated:
+    with SimulatedController("UR5e", free_host(), start_delay_ms=300) as simulated:
         done = run(simulated, odd, *options, "--protective")
         assert done.returncode == 0, done.stderr
         state = simulated.state()
@@ -72,7 +72,7 @@ def test_every_assumption_is_measured_and_a_simulator_with_these_times_measures_
     assert all(0.0 < stop["way_rad"]["p50"] < 0.2 for stop in facts["stops"])
     facts["watchdog_s"]["p50"] = 0.5
     odd.write_text(json.dumps(facts))
-    with SimulatedController("UR5e", free_host(), options=("--measured", str(odd))) as simulated:
+    with SimulatedController("UR5e", free_host(), measured=odd) as simulated:
         assert run(simulated, again, *options, "--speeds", "25", "--paths", "command").returncode == 0
     other = json.loads(again.read_text())
     assert other["start_s"]["p50"] > 0.29

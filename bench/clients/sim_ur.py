@@ -230,7 +230,7 @@ def main() -> int:
         os._exit(0)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.jsonl"
-        with SimulatedController(host=free_host(), start_q=START_JOINTS, log=log, unlock_after=0.0) as simulated:
+        with SimulatedController(host=free_host(), start_q=START_JOINTS, log=log, unlock_after_s=0.0) as simulated:
             command = [sys.executable, "-m", "bench", "sim-ur", "--measure", simulated.host]
             command += ["--calls", str(args.calls), "--stops", str(args.stops)]
             child = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)

@@ -20,12 +20,12 @@ from coneskin.robot.sim.process import SimulatedController, free_host
 #: joint positions with which Universal Robots' own simulator starts [rad]
 START_Q = (-1.6006, -1.7271, -2.2030, -0.8080, 1.5951, -0.0310)
 TEST_TIMEOUT = 90.0  # s
-_URSIM = ("--control", "disabled")  # as URSim is, against which the library is tested
+_URSIM = {"control": "disabled"}  # as URSim is, against which the library is tested
 #: program of tests -> its arguments, and options of the controller
 TEST_PROGRAMS: tuple[tuple[str, tuple[str, ...], dict[str, Any]], ...] = (
     ("primary_client_test_headless", (), {}),
     ("rtde_tests", (), {}),
-    ("dashboard_client_g5_tests", (), {"options": _URSIM}),
+    ("dashboard_client_g5_tests", (), _URSIM),
     ("dashboard_client_g5_tests", (), {"version": "3.15"}),
     ("ur_driver_deprecated_constructor_test", (), {}),
     *(
@@ -201,7 +201,7 @@ def example(program: Path, arguments: Sequence[str], source: Path) -> Trial:
     label = "URCL examples"
     if not os.access(program, os.X_OK):
         return Trial(label, program.name, "skip", 0.0, "it is not built")
-    with robot(source, {"options": _URSIM}) as host:
+    with robot(source, _URSIM) as host:
         begin = time.monotonic()
         command = [str(program), host, *arguments]
         try:

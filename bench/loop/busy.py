@@ -118,7 +118,7 @@ def main() -> None:
     with ExitStack() as stack:
         folder = args.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder.mkdir(exist_ok=True)
-        controller = SimulatedController("UR5e", free_host(), START, log=folder / "log.jsonl", unlock_after=0.0)
+        controller = SimulatedController("UR5e", free_host(), START, log=folder / "log.jsonl", unlock_after_s=0.0)
         stack.enter_context(controller)
         give_precedence(controller.pid)
         skin = Child("-m", "bench.faults.virtual_skin", str(folder / "port"), str(args.seed), "ladder", "1")

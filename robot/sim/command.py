@@ -24,7 +24,7 @@ from coneskin.robot.ur.measured import read_measured
 from .compiler import SIMULATOR_MEMORY, bounded_memory
 from .machine.controller import Controller
 from .machine.states import DEFAULT_MODEL, PORTS, START_Q, Options, Version
-from .motion.remote_plant import RemotePlant
+from .motion.plant import RemotePlant
 from .server import Server, is_loopback
 
 EXAMPLE = """example:

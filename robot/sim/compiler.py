@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import pickle
 import signal
-import struct
 import subprocess
 import sys
 import threading
@@ -19,7 +18,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from queue import SimpleQueue
-from typing import IO
 
 from .machine.builtins import Builtins
 from .urscript.translator import Translation, translate
@@ -57,7 +55,6 @@ _MAX_KNOWN = 100  # programs whose translation is kept
 _IN_PLACE_LENGTH = 4000  # characters; a shorter program is translated in place, in about a millisecond
 _IN_PLACE_TIME = 0.0005  # s of the processor in one cycle, beyond which no further one is begun in place
 _MAX_WAITING = 5000  # programs that have come and are not translated yet; a packet holds fewer
-_LENGTH_PREFIX = struct.Struct(">I")  #: bytes that follow, before each message of the translating process
 
 #: number of a program, and its translation or what is wrong with it
 Result = tuple[int, Translation | ScriptError]
@@ -109,10 +106,7 @@ class Compiler:
         if text in self._known:
             self._done.put((number, self._known[text]))
         elif len(text) <= _IN_PLACE_LENGTH:
-            try:
-                self._done.put((number, _translate(text)))
-            except ScriptError as exc:
-                self._done.put((number, exc))
+            self._done.put((number, _translation(text)))
         else:
             self._todo.put((number, text, secondary))
 
@@ -122,8 +116,10 @@ class Compiler:
         Raises:
             ScriptError: it cannot be translated.
         """
-        if text not in self._known and len(text) <= _IN_PLACE_LENGTH:
-            _translate(text)
+        if text in self._known or len(text) > _IN_PLACE_LENGTH:
+            return
+        if isinstance(made := _translation(text), ScriptError):
+            raise made
 
     def results(self) -> list[Result]:
         """Return what has been translated since the last call; once in each control cycle."""
@@ -143,7 +139,7 @@ class Compiler:
                     continue
                 try:
                     made = _ask(worker, text)
-                except (OSError, struct.error, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
+                except (OSError, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
                     why = f"the translation has failed, or took more than {_TRANSLATION_TIME:g} s: {type(exc).__name__}"
                     self._done.put((number, ScriptError(why)))
                     _end(worker)
@@ -176,9 +172,9 @@ def _ask(worker: subprocess.Popen[bytes], text: str) -> Translation | ScriptErro
     deadline = threading.Timer(_TRANSLATION_TIME, worker.kill)  # the read below then ends
     deadline.start()
     try:
-        _send(worker.stdin, pickle.dumps(text))
-        (length,) = _LENGTH_PREFIX.unpack(worker.stdout.read(_LENGTH_PREFIX.size))
-        made: Translation | ScriptError = pickle.loads(worker.stdout.read(length))
+        pickle.dump(text, worker.stdin)
+        worker.stdin.flush()
+        made: Translation | ScriptError = pickle.load(worker.stdout)
     finally:
         deadline.cancel()
     return made
@@ -187,25 +183,14 @@ def _ask(worker: subprocess.Popen[bytes], text: str) -> Translation | ScriptErro
 def serve() -> None:
     """Translate what comes on stdin until it ends: the main function of the translating process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the controller, which ends this process
-    with bounded_memory(_TRANSLATOR_MEMORY):
-        _serve(sys.stdin.buffer, sys.stdout.buffer)
+    with bounded_memory(_TRANSLATOR_MEMORY), contextlib.suppress(EOFError):
+        while True:
+            pickle.dump(_translation(pickle.load(sys.stdin.buffer)), sys.stdout.buffer)
+            sys.stdout.buffer.flush()
 
 
-def _serve(source: IO[bytes], target: IO[bytes]) -> None:
-    made: Translation | ScriptError
-    while len(head := source.read(_LENGTH_PREFIX.size)) == _LENGTH_PREFIX.size:
-        text = pickle.loads(source.read(_LENGTH_PREFIX.unpack(head)[0]))
-        try:
-            made = _translate(text)
-        except ScriptError as exc:
-            made = exc
-        _send(target, pickle.dumps(made))
-
-
-def _translate(text: str) -> Translation:
-    return translate(text, Builtins.names(), Builtins.blocking())
-
-
-def _send(pipe: IO[bytes], data: bytes) -> None:
-    pipe.write(_LENGTH_PREFIX.pack(len(data)) + data)
-    pipe.flush()
+def _translation(text: str) -> Translation | ScriptError:
+    try:
+        return translate(text, Builtins.names(), Builtins.blocking())
+    except ScriptError as exc:
+        return exc

@@ -60,17 +60,11 @@ class SimulatedController(OwnedProcess):
         host: address to listen on; controllers at 127.0.0.1, 127.0.0.2 ... can run at once.
         start_q: joint positions at the start [rad]; clear of every singular position if not given.
         log: file for a JSON line for each command and event.
-        version: PolyScope version to report.
-        start_delay: from a program's last byte to its first cycle [s].
-        unlock_after: time before a protective stop can be unlocked [s].
-        protective_stop: "pause" or "stop", the effect of a protective stop on the running program.
-        program: URScript file that the dashboard command ``play`` starts.
-        programs: folder of the programs and installations that the dashboard can load.
-        external_control: HOST:PORT at which such a program asks for the script of its External Control node.
-        plant: line to what its targets move, closed here on entry (``motion/remote_plant.py``); without one the arm
+        plant: line to what its targets move, closed here on entry (``motion/plant.py``); without one the arm
             follows them exactly. POSIX only.
         ready_within: time allowed until it listens [s].
-        options: further words of the command line, such as ("--fieldbus",).
+        options: those of ``coneskin sim-ur`` by their names, such as ``unlock_after_s=1, closed=["dashboard"]``; one
+            that has no value is True, as in ``fieldbus=True``.
 
     Raises:
         RobotTimeout: on entry, it is not ready in time.
@@ -86,32 +80,22 @@ class SimulatedController(OwnedProcess):
         start_q: Sequence[float] | None = None,
         *,
         log: Path | None = None,
-        version: str = "5.25",
-        start_delay: float = 0.010,
-        unlock_after: float = 5.0,
-        protective_stop: str = "pause",
-        program: Path | None = None,
-        programs: Path | None = None,
-        external_control: str = "127.0.0.1:50002",
         plant: socket.socket | None = None,
         ready_within: float = 15.0,
-        options: Sequence[str] = (),
+        **options: object,
     ) -> None:
         self.host = host
         self.log = log
         self.ready_within = ready_within
         self.facts: dict[str, Any] = {}
         self._plant = plant
-        self._arguments = [
-            *("--host", host, "--model", model, "--version", version),
-            *("--start-delay-ms", repr(start_delay * 1000.0), "--unlock-after-s", repr(unlock_after)),
-            *("--protective-stop", protective_stop, "--external-control", external_control),
-        ]
-        if start_q is not None:
-            self._arguments += ["--start-q-deg", *(repr(math.degrees(q)) for q in start_q)]
-        for option, path in (("--log", log), ("--program", program), ("--programs", programs)):
-            self._arguments += [] if path is None else [option, str(path)]
-        self._arguments += options
+        options |= {"host": host, "model": model, "log": log}
+        options["start_q_deg"] = None if start_q is None else [math.degrees(q) for q in start_q]
+        self._arguments: list[str] = []
+        for name, value in options.items():
+            if value is not None and value is not False:
+                values = value if isinstance(value, list | tuple) else () if value is True else (value,)
+                self._arguments += [f"--{name.replace('_', '-')}", *map(str, values)]
 
     def __enter__(self) -> SimulatedController:
         command = [sys.executable, "-m", "coneskin.robot.sim.command", "--json", "--faults", "--exit-with-parent"]

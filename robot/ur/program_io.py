@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from enum import IntEnum
 from typing import Any, Self
 
 from coneskin.core.channel import wait_readable
@@ -17,7 +18,7 @@ from coneskin.core.errors import ConeSkinError, RobotConnectionError, RobotRefus
 from coneskin.robot.driver.values import DIGITAL_GROUPS, ArmReading
 
 from . import rtde_codec as rtde
-from .rtde_codec import VARIABLES
+from .rtde_codec import PROGRAM_RUNNING, VARIABLES, RobotMode, SafetyMode
 from .rtde_connection import RtdeConnection
 
 _READING_NAMES = (
@@ -30,17 +31,6 @@ _READING_NAMES = (
 _USUAL_NAMES = (*_READING_NAMES, "safety_status_bits", "robot_status_bits", "target_q", "target_qd", "speed_scaling")
 _FRESH_TIME = 0.1  # s; an older packet is waited out
 _POLL_PERIOD = 0.1  # s in which the thread notices that it is to end
-_PROGRAM_RUNNING = 2  # value of runtime_state
-#: robot_mode and safety_mode as Universal Robots' RTDE guide names them
-_ROBOT_MODES = {
-    **{-1: "NO_CONTROLLER", 0: "DISCONNECTED", 1: "CONFIRM_SAFETY", 2: "BOOTING", 3: "POWER_OFF", 4: "POWER_ON"},
-    **{5: "IDLE", 6: "BACKDRIVE", 7: "RUNNING", 8: "UPDATING_FIRMWARE"},
-}
-_SAFETY_MODES = {
-    **{1: "NORMAL", 2: "REDUCED", 3: "PROTECTIVE_STOP", 4: "RECOVERY", 5: "SAFEGUARD_STOP"},
-    **{6: "SYSTEM_EMERGENCY_STOP", 7: "ROBOT_EMERGENCY_STOP", 8: "VIOLATION", 9: "FAULT"},
-    **{10: "VALIDATE_JOINT_ID", 11: "UNDEFINED_SAFETY_MODE"},
-}
 
 
 class RtdeVariableReader:
@@ -111,26 +101,11 @@ class RtdeVariableReader:
                 self._end()
                 self._open(self._recipe.names)
         recipe, payload = self._fresh()
-        values: dict[str, Any] = dict(zip(recipe.names, recipe.unpack(payload), strict=True))
-        timestamp, q, qd, pose, speed, force, mode, safety, fraction, runtime, *rest = (
-            values[n] for n in _READING_NAMES
-        )
-        return ArmReading(
-            timestamp,
-            q,
-            qd,
-            pose,
-            speed,
-            force,
-            _ROBOT_MODES.get(mode, str(mode)),
-            _SAFETY_MODES.get(safety, str(safety)),
-            fraction,
-            runtime == _PROGRAM_RUNNING,
-            rest[0],
-            rest[1],
-            (rest[2], rest[3], rest[4], rest[5]),
-            (rest[6], rest[7]),
-        )
+        by_name: dict[str, Any] = dict(zip(recipe.names, recipe.unpack(payload), strict=True))
+        values = [by_name[name] for name in _READING_NAMES]
+        values[6:8] = _name(RobotMode, values[6]), _name(SafetyMode, values[7])
+        values[9] = values[9] == PROGRAM_RUNNING
+        return ArmReading._make((*values[:12], tuple(values[12:16]), tuple(values[16:])))
 
     def _open(self, names: tuple[str, ...]) -> None:
         connection = RtdeConnection(self._host, self._timeout, self._clock)
@@ -182,6 +157,10 @@ class RtdeVariableReader:
                     raise RobotTimeout(f"the controller {self._host} has sent no state for {self._timeout:g} s")
                 self._news.wait(left)
             return self._newest[1:]
+
+
+def _name(modes: type[IntEnum], number: int) -> str:
+    return modes(number).name if number in modes._value2member_map_ else str(number)
 
 
 _ANALOG_WORDS = ("mask", "type", "0", "1")

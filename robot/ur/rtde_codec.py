@@ -80,6 +80,40 @@ VARIABLES: Mapping[str, str] = MappingProxyType(_table())
 #: One value on the wire: a scalar, or the tuple of a vector.
 Value = float | int | bool | tuple[float, ...]
 
+
+class RobotMode(IntEnum):
+    """State of the arm: robot_mode."""
+
+    NO_CONTROLLER = -1
+    DISCONNECTED = 0
+    CONFIRM_SAFETY = 1
+    BOOTING = 2
+    POWER_OFF = 3
+    POWER_ON = 4
+    IDLE = 5
+    BACKDRIVE = 6
+    RUNNING = 7
+    UPDATING_FIRMWARE = 8
+
+
+class SafetyMode(IntEnum):
+    """State of the safety system: safety_mode."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    VALIDATE_JOINT_ID = 10
+    UNDEFINED_SAFETY_MODE = 11
+
+
+PROGRAM_RUNNING: Final = 2  #: value of runtime_state
+
 HEADER = struct.Struct(">HB")
 PROTOCOL_VERSION = 2
 NOT_FOUND = "NOT_FOUND"  #: the type that a controller answers for a name that it does not know
@@ -298,7 +332,6 @@ STATE_RECIPE: Final = Recipe((*_STATE_NAMES, *_CURRENT_NAMES))
 _WITHOUT_CURRENTS: Final = Recipe(_STATE_NAMES)  # of recordings made before the reader asked for them
 #: bits 2 to 10: protective, recovery, safeguard, emergency, violation, fault, stopped
 _SAFETY_STOPS: Final = 0b11111111100
-_PROGRAM_RUNNING: Final = 2  # value of runtime_state
 _ARM_RUNNING: Final = 7  # value of robot_mode: powered, brakes released
 
 
@@ -323,7 +356,7 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
             )
         if not math.isfinite(sum(currents)):
             raise RobotConnectionError(f"its motor currents are not finite: {currents} A")
-    powered, running = values[13] == _ARM_RUNNING, values[15] == _PROGRAM_RUNNING
+    powered, running = values[13] == _ARM_RUNNING, values[15] == PROGRAM_RUNNING
     stopped = values[14] & _SAFETY_STOPS != 0
     current, target = (currents[:6], currents[6:]) if currents else (None, None)
     fields = time, controller_time, q, qd, powered, stopped, running, current, target

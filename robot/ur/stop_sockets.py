@@ -32,6 +32,7 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.tcp import TcpStops
 from coneskin.robot.driver.values import SetpointProgram, StopPath
 
+from .rtde_codec import RobotMode
 from .rtde_connection import RtdeConnection
 
 _SLIDER_TIMEOUT = 0.2  # s for connecting, and for each reply, where the slider is used
@@ -46,7 +47,6 @@ end
 _PROOF_REGISTER = 47  # integer output register
 _PROOF_REPEAT = 0.25  # s after which the program is sent again: another guard may have written the register meanwhile
 _PROOF_FREQUENCY = 125.0  # Hz
-_ARM_RUNNING = 7  # value of robot_mode
 _MODE_QUESTION = b"is in remote control\n"
 _LOCAL_REFUSAL = b"command is not allowed"  # begins the dashboard's answer to a command in local control
 _LOCAL_CONTROL = (
@@ -142,7 +142,7 @@ class StopSockets(TcpStops):
         remedy = (
             "its script port is read-only (C210): the controller was in local control when it was opened, or another "
             "program has closed it. Choose Remote Control at the top right of the pendant, then start again"
-            if mode == _ARM_RUNNING
+            if mode == RobotMode.RUNNING
             else "the arm is not powered, or its brakes are not released: power it on, then start again"
         )
         raise RobotRefused(

@@ -15,8 +15,14 @@ from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
-from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantState
-from coneskin.robot.sim.motion.remote_plant import RemotePlant, decode_targets, encode_state
+from coneskin.robot.sim.motion.plant import (
+    KinematicPlant,
+    Plant,
+    PlantState,
+    RemotePlant,
+    decode_targets,
+    encode_state,
+)
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
 from tests.support.scenes import START, forearm_scene

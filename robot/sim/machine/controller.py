@@ -14,7 +14,7 @@ from coneskin.robot.sim.motion.arm import CYCLE, SUDDEN_CHANGE, TRIGGERED, StopC
 from coneskin.robot.sim.motion.plant import KinematicPlant, Plant, PlantLost
 from coneskin.robot.sim.urscript.translator import Translation
 from coneskin.robot.sim.urscript.values import ScriptError, values_of
-from coneskin.robot.ur.rtde_codec import Value
+from coneskin.robot.ur.rtde_codec import RobotMode, SafetyMode, Value
 
 from .inputs_outputs import InputWatchdog, digital_outputs
 from .program import Program
@@ -27,9 +27,7 @@ from .states import (
     Options,
     ProgramFailed,
     ProgramNotice,
-    RobotMode,
     Runtime,
-    SafetyMode,
     SafetyNotice,
 )
 

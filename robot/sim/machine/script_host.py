@@ -15,9 +15,10 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
 from coneskin.robot.sim.urscript.translator import Interpreter
 from coneskin.robot.sim.urscript.values import ScriptError
+from coneskin.robot.ur.rtde_codec import SafetyMode
 
 from .inputs_outputs import ClientInputs, Terminals, with_bits
-from .states import Notice, Options, ProgramFailed, SafetyMode
+from .states import Notice, Options, ProgramFailed
 
 _PENDING_ERRORS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 _MAX_UNREAD = 65_536  # bytes that have come and that the program has not read; more wait in the network

@@ -16,6 +16,7 @@ import re
 import struct
 import xmlrpc.client
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from typing import Any
 from urllib.parse import urlsplit
 from xml.parsers.expat import ExpatError
@@ -121,24 +122,21 @@ class SocketFunctions:
     ) -> Generator[None, None, Array]:
         """Read numbers as text, ``(1.5, 2)``; return how many came, and their values; 0 and NaN after the timeout."""
         count = _count(number)
-        values: list[float] = []
 
-        def take(connection: ScriptSocket) -> bool:
+        def take(connection: ScriptSocket) -> bytes | None:
             match = _NUMBER_LIST.match(connection.unread)
             if match is None:
                 connection.forget_if_full()
-                return False
-            parts = match[1].split(b",")  # a match reads the bytes again, so before they are taken
+                return None
+            text: bytes = match[1]  # a match reads the bytes again, so before they are taken
             connection.pop(match.end())
-            for part in parts:
-                try:
-                    values.append(float(part))
-                except ValueError:
-                    break
-            return True
+            return text
 
-        yield from self._wait(socket_name, timeout, take)
-        values = values[:count]
+        text = yield from self._wait(socket_name, timeout, take)
+        values: list[float] = []
+        with suppress(ValueError):
+            for part in text.split(b",")[:count]:
+                values.append(float(part))
         return Array([len(values), *values, *[math.nan] * (count - len(values))])
 
     def socket_read_binary_integer(
@@ -172,9 +170,8 @@ class SocketFunctions:
     ) -> Generator[None, None, str]:
         """Read a text: what stands between prefix and suffix, or without them what has come."""
         first, last = (_bytes(text, bool(interpret_escape)) for text in (prefix, suffix))
-        found: list[bytes] = []
 
-        def take(connection: ScriptSocket) -> bool:
+        def take(connection: ScriptSocket) -> bytes | None:
             unread = connection.unread
             start = unread.find(first) if first else 0
             end = len(unread)
@@ -182,28 +179,24 @@ class SocketFunctions:
                 end = unread.find(last, start + len(first))
             if start < 0 or end < 0 or not unread:
                 connection.forget_if_full()
-                return False
-            found.append(connection.pop(end + len(last))[start + len(first) : end][:MAX_LINE])
-            return True
+                return None
+            return connection.pop(end + len(last))[start + len(first) : end][:MAX_LINE]
 
-        yield from self._wait(socket_name, timeout, take)
-        return found[0].decode("utf-8", "replace") if found else ""
+        text = yield from self._wait(socket_name, timeout, take)
+        return text.decode("utf-8", "replace")
 
     def _read(self, count: int, name: Any, timeout: Any) -> Generator[None, None, bytes]:
         """Read so many bytes, none of them after the timeout."""
-        found: list[bytes] = []
 
-        def take(connection: ScriptSocket) -> bool:
-            if len(connection.unread) < count:
-                return False
-            found.append(connection.pop(count))
-            return True
+        def take(connection: ScriptSocket) -> bytes | None:
+            return connection.pop(count) if len(connection.unread) >= count else None
 
-        yield from self._wait(name, timeout, take)
-        return found[0] if found else b""
+        return (yield from self._wait(name, timeout, take))
 
-    def _wait(self, name: Any, timeout: Any, take: Callable[[ScriptSocket], bool]) -> Generator[None, None, None]:
-        """Wait until something could be taken, the timeout [s] is over, or the server has gone."""
+    def _wait(
+        self, name: Any, timeout: Any, take: Callable[[ScriptSocket], bytes | None]
+    ) -> Generator[None, None, bytes]:
+        """Return what could be taken; nothing once the timeout [s] is over, or the server has gone."""
         limit = number(timeout, "a timeout")
         cycles = round(limit / self._host.steptime) if limit > 0.0 else 0
         begin, waited = self._host.outside_time(), 0
@@ -214,15 +207,15 @@ class SocketFunctions:
                 if connection.gives_way(self._host.cycle):
                     yield
                     continue
-                if take(connection):
-                    return
+                if (taken := take(connection)) is not None:
+                    return taken
             yield
             waited += 1
             late = (
                 waited >= cycles and self._host.outside_time() - begin > limit - 0.5 * self._host.steptime
             )  # the server's time too
             if connection is None or connection.ended or (limit > 0.0 and late):
-                return
+                return b""
 
 
 def _may_connect(address: str, beyond: bool) -> str:

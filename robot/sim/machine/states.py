@@ -12,6 +12,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Literal
 
+from coneskin.robot.ur.rtde_codec import SafetyMode
+
 
 class Runtime(IntEnum):
     """State of the program: RTDE's runtime_state."""
@@ -34,29 +36,6 @@ class Runtime(IntEnum):
         return "PLAYING" if self is Runtime.PLAYING else "PAUSED" if self.paused else "STOPPED"
 
 
-class RobotMode(IntEnum):
-    """State of the arm: RTDE's robot_mode."""
-
-    POWER_OFF = 3
-    POWER_ON = 4
-    IDLE = 5
-    RUNNING = 7
-
-
-class SafetyMode(IntEnum):
-    """State of the safety system: RTDE's safety_mode."""
-
-    NORMAL = 1
-    REDUCED = 2
-    PROTECTIVE_STOP = 3
-    RECOVERY = 4
-    SAFEGUARD_STOP = 5
-    SYSTEM_EMERGENCY_STOP = 6
-    ROBOT_EMERGENCY_STOP = 7
-    VIOLATION = 8
-    FAULT = 9
-
-
 #: state -> word of RTDE's safety_status_bits
 SAFETY_BITS = {
     SafetyMode.NORMAL: 1 << 0,
@@ -76,6 +55,13 @@ MOVING = frozenset((SafetyMode.NORMAL, SafetyMode.REDUCED))
 
 
 Version = tuple[int, int]
+
+
+def has_since(version: Version, polyscope_5: int | None, cb3: int | None) -> bool:
+    """Return whether a version has what came with these minor ones of PolyScope 5 and of CB3; None for never."""
+    first = cb3 if version[0] == 3 else polyscope_5
+    return first is not None and (version[0] > 5 or version[1] >= first)
+
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}

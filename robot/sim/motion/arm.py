@@ -26,6 +26,7 @@ from coneskin.robot.arm.kinematics import flange_jacobian, forward
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.sim.urscript.values import solve_linear
 
+from .plant import CYCLE as CYCLE
 from .plant import KinematicPlant, PlantState
 
 _JOINT_NAMES = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
@@ -64,7 +65,6 @@ def _deviation(joint: int) -> StopCause:
     return StopCause(153, joint, f"Position deviates from path: Detected by the {_JOINT_NAMES[joint]} joint.")
 
 
-CYCLE = 0.002  #: control cycle of an e-Series controller [s]
 CONTROLLER_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]

@@ -30,8 +30,6 @@ from coneskin.robot.sim.machine.states import (
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
-    RobotMode,
-    SafetyMode,
     SafetyNotice,
     TextNotice,
     Version,
@@ -40,6 +38,7 @@ from coneskin.robot.sim.motion.arm import JOINT_ACCELERATION
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
 from coneskin.robot.sim.urscript.values import ScriptError, values_of
+from coneskin.robot.ur.rtde_codec import RobotMode, SafetyMode
 
 MESSAGE = 20  #: kind of a packet that holds one message
 _TEXT_MESSAGE, _POPUP_MESSAGE, _VERSION_MESSAGE, _SAFETY_MESSAGE = 0, 2, 3, 5  # kinds of messages

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from coneskin.robot.sim.machine.controller import POWER_COMMANDS
-from coneskin.robot.sim.machine.states import Runtime, Version
+from coneskin.robot.sim.machine.states import Runtime, Version, has_since
 from coneskin.robot.sim.urscript.values import ScriptError
 
 from .rtde import BUGFIX_VERSION, BUILD_NUMBER
@@ -68,15 +68,19 @@ class Dashboard:
         self._c = interface.controller
         self.left = False
         self._opened_local = not interface.controller.remote_control
+        major, minor = interface.controller.options.version
+        version = f"{major}.{minor}.{BUGFIX_VERSION}.{BUILD_NUMBER}"
         self._commands: dict[str, Callable[[str], str]] = {
-            "PolyscopeVersion": lambda _: f"URSoftware {self._version} (Jan 01 2026)",
+            "PolyscopeVersion": lambda _: f"URSoftware {version} (Jan 01 2026)",
             "addToLog": self._add_to_log,
             "clear operational mode": self._clear_operational_mode,
-            "close popup": self._close_popup,
+            "close popup": lambda _: "closing popup",
             "close safety popup": lambda _: "closing safety popup",
             "generate flight report": lambda kind: f"Flight Report generated with id: {self._i.report(kind)}",
             "generate support file": self._support_file,
-            "get loaded program": self._loaded_program,
+            "get loaded program": lambda _: (
+                f"Loaded program: {self._i.loaded.path}" if self._i.loaded is not None else "No program loaded"
+            ),
             "get operational mode": lambda _: self._i.operational_mode,
             "get robot model": lambda _: self._c.arm.model.name.removesuffix("e"),
             "get serial number": lambda _: SERIAL_NUMBER,
@@ -88,7 +92,7 @@ class Dashboard:
             "pause": lambda _: "Pausing program" if self._c.pause_program() else "Failed to execute: pause",
             "play": lambda _: "Starting program" if self._i.play() else "Failed to execute: play",
             "popup": self._popup,
-            "programState": lambda _: f"{self._state} {self._i.program_name}",
+            "programState": lambda _: f"{self._c.runtime.word} {self._i.program_name}",
             "quit": self._quit,
             "robotmode": lambda _: f"Robotmode: {self._c.robot_mode.name}",
             "running": lambda _: f"Program running: {str(self._c.runtime is Runtime.PLAYING).lower()}",
@@ -100,7 +104,7 @@ class Dashboard:
             "shutdown": self._shut_down,
             "stop": self._stop,
             "unlock protective stop": lambda _: "Protective stop releasing" if self._c.unlock() else _UNLOCK_REFUSED,
-            "version": lambda _: self._version,
+            "version": lambda _: version,
         }
         for name in POWER_COMMANDS:
             self._commands[name] = lambda _, command=name: self._c.switch_power(command)  # type: ignore[misc]
@@ -124,15 +128,6 @@ class Dashboard:
                 return self._commands[name](" ".join(words[count:]).strip())
         return f"could not understand: '{command}'"
 
-    @property
-    def _version(self) -> str:
-        major, minor = self._c.options.version
-        return f"{major}.{minor}.{BUGFIX_VERSION}.{BUILD_NUMBER}"
-
-    @property
-    def _state(self) -> str:
-        return self._c.runtime.word
-
     # programs
 
     def _load(self, name: str) -> str:
@@ -149,11 +144,7 @@ class Dashboard:
         if not name.endswith(".installation") or not self._i.folder.has(name):
             return f"File not found: {name}"
         self._i.stop("another installation was loaded")
-        self._i.installation = name
         return f"Loading installation: {name}"
-
-    def _loaded_program(self, _: str) -> str:
-        return f"Loaded program: {self._i.loaded.path}" if self._i.loaded is not None else "No program loaded"
 
     def _stop(self, _: str) -> str:
         self._i.stop("dashboard")
@@ -162,13 +153,8 @@ class Dashboard:
     # windows, log, modes
 
     def _popup(self, text: str) -> str:
-        self._i.popup = text
         self._c.log("popup", text=text, title="")
         return "showing popup"
-
-    def _close_popup(self, _: str) -> str:
-        self._i.popup = ""
-        return "closing popup"
 
     def _add_to_log(self, text: str) -> str:
         if not text:
@@ -216,6 +202,4 @@ class Dashboard:
 
 def available(command: str, version: Version) -> bool:
     """Return whether a version of the software has a command."""
-    e_series, cb3 = _FIRST_VERSIONS.get(command, (0, 0))
-    first = cb3 if version[0] == 3 else e_series
-    return first is not None and (version[0] > 5 or version[1] >= first)
+    return has_since(version, *_FIRST_VERSIONS.get(command, (0, 0)))

@@ -19,7 +19,7 @@ from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
-from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, RobotMode, Runtime, Version
+from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, Runtime, Version, has_since
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
 from coneskin.robot.ur.rtde_codec import (
@@ -29,6 +29,7 @@ from coneskin.robot.ur.rtde_codec import (
     Packet,
     PacketKind,
     Recipe,
+    RobotMode,
     Value,
     pack,
     split,
@@ -69,10 +70,7 @@ def available(name: str, version: Version) -> bool:
     """Return whether a controller of that version has this output. The input registers are outputs too."""
     if name not in VARIABLES or (name in INPUTS and not name.startswith("input_")):
         return False
-    since, cb3 = _FIRST_VERSIONS.get(name, (0, 0))
-    if version[0] == 3:
-        return cb3 is not None and version[1] >= cb3
-    return version[0] > 5 or version[1] >= since
+    return has_since(version, *_FIRST_VERSIONS.get(name, (0, 0)))
 
 
 class RtdeOutputs:

@@ -15,7 +15,7 @@ import time
 import zipfile
 from collections import deque
 from collections.abc import Callable
-from queue import Empty, SimpleQueue
+from concurrent.futures import Future
 
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
@@ -29,32 +29,20 @@ _FIRST_TIMEOUT = 2.0  # s; until the script begins to come
 _SCRIPT_PAUSE = 0.1  # s; the script has come to its end when nothing more comes for so long
 
 
-class _ScriptRequest:
-    """Request for a script, made in a thread of its own.
+def _request_script(address: tuple[str, int]) -> Future[str]:
+    """Ask the program at an address for a script, in a thread that ends with this process."""
+    script: Future[str] = Future()
 
-    Args:
-        address: host and port of the program that has it.
-    """
-
-    def __init__(self, address: tuple[str, int]) -> None:
-        self.address = address
-        self._answer: SimpleQueue[str | OSError] = SimpleQueue()
-        threading.Thread(target=self._ask, daemon=True).start()
-
-    def result(self) -> str | OSError | None:
-        """Return the script, or why there is none; None while it is still to come."""
+    def ask() -> None:
         try:
-            return self._answer.get_nowait()
-        except Empty:
-            return None
-
-    def _ask(self) -> None:
-        try:
-            with socket.create_connection(self.address, _CONNECT_TIMEOUT) as sock:
+            with socket.create_connection(address, _CONNECT_TIMEOUT) as sock:
                 sock.sendall(_SCRIPT_REQUEST)
-                self._answer.put(_read(sock).decode("utf-8", "replace"))
+                script.set_result(_read(sock).decode("utf-8", "replace"))
         except OSError as exc:
-            self._answer.put(exc)
+            script.set_exception(exc)
+
+    threading.Thread(target=ask, daemon=True).start()
+    return script
 
 
 def _read(sock: socket.socket) -> bytes:
@@ -99,10 +87,8 @@ class UserInterface:
         run: as given.
         folder: its disk.
         loaded: program that ``play`` starts; None before the first.
-        installation: that is loaded.
         operational_mode: that a client has set; NO_MODE where none has.
         user_role: of CB3.
-        popup: text of the window that a client has opened; empty where none is open.
     """
 
     def __init__(
@@ -112,15 +98,13 @@ class UserInterface:
         self.controller = controller
         self.folder = ProgramFolder(options.programs)
         self.loaded = ProgramFile("play.script", "play.script", options.program) if options.program else None
-        self.installation = "default.installation"
         self.operational_mode = NO_MODE
         self.user_role = "PROGRAMMER"
-        self.popup = ""
         self.messages: deque[str] = deque(maxlen=_MAX_MESSAGES)
         self.reports: deque[str] = deque(maxlen=_MAX_REPORTS)
         self.run = run
         self._check = check
-        self._request: _ScriptRequest | None = None
+        self._request: Future[str] | None = None
         self._count = 0
 
     # programs
@@ -159,22 +143,22 @@ class UserInterface:
             controller.fail(self.loaded.name, exc)
             return False
         if self.loaded.takes_external_script:
-            self._request = _ScriptRequest(controller.options.external_control)
+            self._request = _request_script(controller.options.external_control)
         else:
             self.run(self.loaded.text)
         return True
 
     def turn(self) -> None:
         """Start the loaded program once the script of its External Control node has come; called in each cycle."""
-        if self._request is None or (script := self._request.result()) is None:
+        if self._request is None or self.loaded is None or not self._request.done():
             return
-        address, self._request = self._request.address, None
-        if isinstance(script, str) and self.loaded is not None:
-            self.run(self.loaded.text.replace(EXTERNAL_CONTROL, script))
-        else:
-            host, port = address
-            problem = f"the node External Control got no script from {host} port {port}: {script}"
-            self.controller.fail(self.loaded.name if self.loaded else "", ScriptError(problem))
+        request, self._request = self._request, None
+        try:
+            self.run(self.loaded.text.replace(EXTERNAL_CONTROL, request.result()))
+        except OSError as exc:
+            host, port = self.controller.options.external_control
+            problem = f"the node External Control got no script from {host} port {port}: {exc}"
+            self.controller.fail(self.loaded.name, ScriptError(problem))
 
     def stop(self, reason: str) -> None:
         """Stop the program that runs, or is about to."""

@@ -11,13 +11,20 @@ import pytest
 from coneskin.core.channel import Channel, pair
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.states import START_Q, Options, RobotMode, SafetyMode
+from coneskin.robot.sim.machine.states import START_Q, Options
 from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.sim.motion.motion import SpeedJoints
-from coneskin.robot.sim.motion.plant import PlantLost, PlantState
-from coneskin.robot.sim.motion.remote_plant import _MAX_LAG, RemotePlant, decode_targets, encode_state
+from coneskin.robot.sim.motion.plant import (
+    _MAX_LAG,
+    PlantLost,
+    PlantState,
+    RemotePlant,
+    decode_targets,
+    encode_state,
+)
 from coneskin.robot.sim.ports.client_interface import _encode_realtime
 from coneskin.robot.sim.ports.rtde import RtdeOutputs
+from coneskin.robot.ur.rtde_codec import RobotMode, SafetyMode
 
 ELSEWHERE = PlantState(
     (0.1, -1.0, 1.0, -1.0, -1.0, 0.2), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)

@@ -114,13 +114,13 @@ def test_of_three_thousand_programs_in_one_go_the_last_runs_and_no_cycle_waits(
     server: Server, reader: Reader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     translated: list[str] = []
-    translate = compiler._translate
+    translate = compiler._translation
 
     def counted(text: str) -> Translation:
         translated.append(text)
         return translate(text)
 
-    monkeypatch.setattr(compiler, "_translate", counted)
+    monkeypatch.setattr(compiler, "_translation", counted)
     with connect(server, "secondary") as client:
         data = b"".join(b"def p%d():\n while True:\n  sync()\n end\nend\n" % i for i in range(3000))
         cycles = 0
@@ -143,8 +143,8 @@ def test_secondary_programs_share_the_time_of_many_cycles(server: Server, monkey
         clock[0] += 0.0003
         return make(text)
 
-    make = compiler._translate
-    monkeypatch.setattr(compiler, "_translate", translate)
+    make = compiler._translation
+    monkeypatch.setattr(compiler, "_translation", translate)
     monkeypatch.setattr(compiler.time, "thread_time", lambda: clock[0])
     for _ in range(100):
         server._program("sec s():\n  textmsg(1)\nend\n")

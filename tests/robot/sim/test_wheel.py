@@ -31,7 +31,7 @@ STOP_J = 34  # number of the command in the wheel's program
 @pytest.fixture(scope="module")
 def simulated(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimulatedController]:
     log = tmp_path_factory.mktemp("sim") / "log.jsonl"
-    with SimulatedController("ur10e", free_host(), HOME, log=log, unlock_after=1.5) as controller:
+    with SimulatedController("ur10e", free_host(), HOME, log=log, unlock_after_s=1.5) as controller:
         yield controller
 
 

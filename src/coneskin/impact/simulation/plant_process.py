@@ -34,8 +34,7 @@ def main(arguments: list[str]) -> int:
     """Take the channels and the scene, and follow the controller until it ends, or the program does."""
     _, (program, controller, skin) = inherit(arguments)  # it ends with the program at once
     from coneskin.robot.sim.motion.arm import CYCLE
-    from coneskin.robot.sim.motion.plant import PlantLost
-    from coneskin.robot.sim.motion.remote_plant import decode_targets, encode_state
+    from coneskin.robot.sim.motion.plant import PlantLost, decode_targets, encode_state
     from coneskin.scene.reader import parse_scene
 
     from .impact_outcome import ImpactMeter, TouchRecorder, TruthRecorder

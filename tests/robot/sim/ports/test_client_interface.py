@@ -14,7 +14,6 @@ from coneskin.robot.sim.machine.states import (
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
-    SafetyMode,
     SafetyNotice,
     TextNotice,
 )
@@ -27,6 +26,7 @@ from coneskin.robot.sim.ports.client_interface import (
     _encode_version,
     _realtime_size,
 )
+from coneskin.robot.ur.rtde_codec import SafetyMode
 
 _TIME = bytes(8)
 

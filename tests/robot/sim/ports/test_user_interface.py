@@ -6,16 +6,10 @@ import socket
 import threading
 from pathlib import Path
 
-from coneskin.robot.sim.ports.user_interface import _ScriptRequest
+import pytest
+
+from coneskin.robot.sim.ports.user_interface import _request_script
 from tests.robot.sim.ports.console import EXTERNAL, Console, save_program
-
-
-def wait_for(request: _ScriptRequest) -> str | OSError:
-    """Return what a request ends with."""
-    ended = threading.Event()
-    while (found := request.result()) is None:
-        ended.wait(0.002)
-    return found
 
 
 def serve_once(listener: socket.socket, *parts: bytes) -> None:
@@ -32,14 +26,15 @@ def test_a_script_comes_in_parts_and_ends_with_a_pause() -> None:
         text = b"x = 1\n" * 20_000
         thread = threading.Thread(target=serve_once, args=(listener, text[:70_000], text[70_000:]))
         thread.start()
-        assert wait_for(_ScriptRequest(listener.getsockname())) == text.decode()
+        assert _request_script(listener.getsockname()).result() == text.decode()
         thread.join()
 
 
 def test_nobody_there_is_said() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         address = listener.getsockname()
-    assert isinstance(wait_for(_ScriptRequest(address)), ConnectionRefusedError)
+    with pytest.raises(ConnectionRefusedError):
+        _request_script(address).result()
 
 
 def test_play_starts_what_the_other_program_answers(tmp_path: Path) -> None:
