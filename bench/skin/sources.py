@@ -21,7 +21,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort
-from coneskin.skin.sources.source_group import SourceGroup
+from coneskin.skin.sources.source import SourceGroup
 from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, write_all
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, encode

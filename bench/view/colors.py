@@ -9,7 +9,7 @@ contrast by WCAG 2.2, of colors that a simulation of an eye without one kind of 
 from __future__ import annotations
 
 from bench.report import head, show
-from coneskin.view.history import PHASE_COLOURS
+from coneskin.view.run_course import PHASE_COLOURS
 from coneskin.view.stage.level_scale import SHEET_COLOURS
 from coneskin.view.stage_nodes import LOCATED
 from tests.support.eyes import EYES, contrast

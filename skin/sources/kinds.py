@@ -16,7 +16,7 @@ from typing import Any, Final
 from coneskin.core.errors import SensorError
 from coneskin.core.keys import Key, with_meanings
 
-from .source import Source
+from .source import Source, SourceGroup
 
 #: Kind of several sources that are read as one; its setting ``members`` holds a kind and its settings for each.
 GROUP: Final = "group"
@@ -117,8 +117,6 @@ def open_source(kind: str, settings: Mapping[str, Any], port: str = "") -> Sourc
         SensorError: there is no such kind, or its row names nothing that can be imported.
     """
     if kind == GROUP:
-        from .source_group import SourceGroup
-
         return SourceGroup([open_source(name, values) for name, values in settings["members"]])
     row = find_kind(kind)
     if row is None:

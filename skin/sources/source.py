@@ -1,17 +1,22 @@
-"""Protocol of a source of bytes, and reopening of one that is gone.
+"""Protocol of a source of bytes, reopening of one that is gone, and several that are read as one.
 
-Opening a port may take seconds, a guard's loop may not: so it is done in a thread of its own.
+Opening a port may take seconds, a guard's loop may not: so it is done in a thread of its own. A guard has one stream of
+bytes, which is what it records and replays. Where sensors are on several ports, frames that are cut must not be mixed:
+what one port sends is handed on up to its last whole frame.
 """
 
 from __future__ import annotations
 
+import select
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
-from coneskin.core.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError, SensorError, SkinConnectionError, SkinTimeout
+from coneskin.skin.wire import FrameDecoder
 
 
 class Openable(Protocol):
@@ -107,3 +112,114 @@ class SourceReopening:
                 self._source.open()
                 self.opened = True
                 return
+
+
+_TURN_TIME = 0.001  # s for each source in turn, where there is nothing to wait on for all of them
+
+
+class _FrameBoundary:
+    """A stream of bytes that is handed on in whole frames; what is no frame goes with the next one."""
+
+    __slots__ = ("_decoder", "_rest")
+
+    def __init__(self) -> None:
+        self._decoder = FrameDecoder()
+        self._rest = b""
+
+    def cut(self, data: bytes) -> bytes:
+        """Take the next bytes; return all that belong to whole frames, or to none, with what was kept before."""
+        self._decoder.feed(data)
+        whole = self._rest + data
+        end = len(whole) - self._decoder.pending
+        self._rest = whole[end:]
+        return whole[:end]
+
+
+class SourceGroup(Source):
+    """Several sources as one.
+
+    It is gone as soon as one of them is: a guard that lost a part of its skin must not go on with the rest.
+
+    Args:
+        sources: at least two, none open; they must not be used otherwise.
+
+    Attributes:
+        name: all their names.
+
+    Raises:
+        SensorError: there are fewer than two, or two have the same name: one port cannot be read twice.
+    """
+
+    def __init__(self, sources: Sequence[Source]) -> None:
+        names = [source.name for source in sources]
+        if len(sources) < 2 or len(set(names)) < len(names):
+            raise SensorError(
+                f"a group needs two or more sources with different ports, got {', '.join(names) or 'none'}"
+            )
+        self.name = " + ".join(names)
+        self._sources = tuple(sources)
+        self._cuts = {source.name: _FrameBoundary() for source in sources}
+        self._opened = False
+        self._poll: Any = None
+        self._by_descriptor: dict[int, Source] = {}
+
+    def open(self) -> None:
+        """Open all of them, or none."""
+        if self._opened:
+            return
+        try:
+            for source in self._sources:
+                source.open()
+        except BaseException:
+            self.close()
+            raise
+        self._opened = True
+        self._cuts = {source.name: _FrameBoundary() for source in self._sources}
+        descriptors = [source.fileno() for source in self._sources]
+        if hasattr(select, "epoll") and None not in descriptors:
+            self._poll = select.epoll()
+            for source, descriptor in zip(self._sources, descriptors, strict=True):
+                assert descriptor is not None
+                self._by_descriptor[descriptor] = source
+                self._poll.register(descriptor, select.EPOLLIN)
+
+    def close(self) -> None:
+        """Close all of them."""
+        poll, self._poll, self._opened = self._poll, None, False
+        self._by_descriptor.clear()
+        if poll is not None:
+            poll.close()
+        for source in self._sources:
+            source.close()
+
+    def fileno(self) -> int | None:
+        """Return a descriptor that becomes readable with any of them, or None where the system has no such thing."""
+        return None if self._poll is None else int(self._poll.fileno())
+
+    def read(self, timeout: float) -> bytes:
+        """Wait for whole frames of any of them, as every Source does."""
+        if not self._opened:
+            raise SkinConnectionError(f"{self.name} is not open: call open, or read it inside a with")
+        deadline = time.monotonic() + timeout
+        left = timeout
+        while True:
+            data = self._read_ready(left) if self._poll is not None else self._read_in_turn()
+            if data:
+                return data
+            left = deadline - time.monotonic()
+            if left <= 0.0:
+                raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
+
+    def _read_ready(self, timeout: float) -> bytes:
+        return b"".join(
+            self._read_one(self._by_descriptor[descriptor], 0.0) for descriptor, _ in self._poll.poll(max(timeout, 0.0))
+        )
+
+    def _read_in_turn(self) -> bytes:
+        return b"".join(self._read_one(source, _TURN_TIME) for source in self._sources)
+
+    def _read_one(self, source: Source, timeout: float) -> bytes:
+        try:
+            return self._cuts[source.name].cut(source.read(timeout))
+        except SkinTimeout:
+            return b""

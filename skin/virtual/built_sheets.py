@@ -39,28 +39,18 @@ _CACHE_SIZE = 128  # places whose matrices are kept
 class SheetFlaws:
     """What is not ideal about one sheet. x runs from its first electrode (B, D) to its second (A, C), 0 to 1.
 
-    Attributes:
-        slope: change of its resistance from the first electrode to the second, a ratio.
-        slope_across: from one insulated edge to the other.
-        patches: standard deviation of its resistance from place to place, a ratio.
-        skew: conductance across the field over that along it; how aslant current runs.
-        stretch: conductance across over that along, less 1.
-        lines: of both electrodes from end to end [ohm].
-        peeled: part of the first electrode that is not bonded, in its middle.
-        seed: of the patches.
-
     Raises:
         SensorError: no sheet can be so.
     """
 
-    slope: float = 0.0
-    slope_across: float = 0.0
-    patches: float = 0.0
-    skew: float = 0.0
-    stretch: float = 0.0
-    lines: tuple[float, float] = (0.0, 0.0)
-    peeled: float = 0.0
-    seed: int = 0
+    slope: float = 0.0  #: change of its resistance from the first electrode to the second, a ratio
+    slope_across: float = 0.0  #: from one insulated edge to the other
+    patches: float = 0.0  #: standard deviation of its resistance from place to place, a ratio
+    skew: float = 0.0  #: conductance across the field over that along it; how aslant current runs
+    stretch: float = 0.0  #: conductance across over that along, less 1
+    lines: tuple[float, float] = (0.0, 0.0)  #: of both electrodes from end to end [ohm]
+    peeled: float = 0.0  #: part of the first electrode that is not bonded, in its middle
+    seed: int = 0  #: of the patches
 
     def __post_init__(self) -> None:
         if not (abs(self.slope) + abs(self.slope_across) < 1.5 and 0.0 <= self.patches < 0.3):

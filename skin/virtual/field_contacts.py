@@ -34,23 +34,14 @@ from .ladder import ResistorLadder
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FixedDiscs:
-    """The places of k contacts on a sheet, and all that does not depend on how firmly they are pressed.
+    """The places of k contacts on a sheet, and all that does not depend on how firmly they are pressed."""
 
-    Attributes:
-        model: the sheet and its resistances.
-        largest: radius up to which each contact may grow [m], shape (k,).
-        order: multipole order M that the model's tolerance needs at these radii and a perfect bond.
-        block: K between the places at their largest radii, in units of Ru + Rl, shape (k, 2M+1, k, 2M+1).
-        right: f for h0, hx and hy, shape (k, 2M+1, 3).
-        error: estimate of the error at these radii, relative to the supply; smaller contacts have a smaller one.
-    """
-
-    model: FieldModel
-    largest: Floats
-    order: int
-    block: Floats
-    right: Floats
-    error: float
+    model: FieldModel  #: the sheet and its resistances
+    largest: Floats  #: radius up to which each contact may grow [m], shape (k,)
+    order: int  #: multipole order M that the model's tolerance needs at these radii and a perfect bond
+    block: Floats  #: K between the places at their largest radii, in units of Ru + Rl, shape (k, 2M+1, k, 2M+1)
+    right: Floats  #: f for h0, hx and hy, shape (k, 2M+1, 3)
+    error: float  #: estimate of the error at these radii, relative to the supply; smaller contacts have a smaller one
 
     @classmethod
     def of(cls, model: FieldModel, u: ArrayLike, phi: ArrayLike, largest: ArrayLike) -> _FixedDiscs:

@@ -17,15 +17,10 @@ from coneskin.core.errors import SensorError
 
 
 class _RoundContact(NamedTuple):
-    """A round contact between the layers.
+    """A round contact between the layers."""
 
-    Attributes:
-        radius: [m]; 0 where the layers do not touch.
-        conductance: per area [S/m^2].
-    """
-
-    radius: float
-    conductance: float
+    radius: float  #: [m]; 0 where the layers do not touch
+    conductance: float  #: per area [S/m^2]
 
     @property
     def siemens(self) -> float:
@@ -37,16 +32,12 @@ class _RoundContact(NamedTuple):
 class Foam:
     """A viscoelastic substrate, a standard linear solid.
 
-    Attributes:
-        relaxation_time: of the delayed part at constant force [s].
-        delayed: part of the final give that comes late, 0 to below 1.
-
     Raises:
         SensorError: a value out of range.
     """
 
-    relaxation_time: float = 0.02
-    delayed: float = 0.5
+    relaxation_time: float = 0.02  #: of the delayed part at constant force [s]
+    delayed: float = 0.5  #: part of the final give that comes late, 0 to below 1
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.relaxation_time) and self.relaxation_time > 0.0):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, DrivenPotentials, Frame
+from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, Frame
 
 from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, join, measure
 from .fault_injection import FaultInjection, FaultyLine
@@ -256,10 +256,7 @@ def _channels(frame_length: int) -> tuple[str, ...]:
     """Return the readings that a frame of a length carries, in the order in which they are made."""
     if frame_length not in FRAME_LENGTHS:
         raise SensorError(f"frame_length must be one of 36, 40, 52 bytes, got {frame_length!r}")
-    names = ConverterInputs._fields
-    if frame_length == FRAME_LENGTH:
-        return names[: names.index("touch_supply") + 1]
-    return names if frame_length == FRAME_LENGTHS[-1] else names[: -len(DrivenPotentials._fields)]
+    return ConverterInputs._fields[: (frame_length - 16) // 2]
 
 
 def contact_model(name: str) -> ContactModel:

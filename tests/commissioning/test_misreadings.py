@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.marks import MIN_POWER, _azimuth_margin, _slant_places, plan_marks
+from coneskin.commissioning.acceptance.marks import _SLANT_PARTS, MIN_POWER, _azimuth_margin, plan_marks
 from coneskin.commissioning.misreadings import (
     RIGHT,
     WRONG,
@@ -50,7 +50,7 @@ def offered(sensor: Sensor, first: float = 0.0) -> list[Mark]:
     angles = [math.radians(first + 15.0 * k) for k in range(24)]
     return [
         Mark(u, phi, "")
-        for u in _slant_places(sensor)
+        for u in (part * sensor.frustum.slant for part in _SLANT_PARTS)
         for phi in angles
         if margin <= phi <= sensor.frustum.wrap - margin
     ]

@@ -14,7 +14,7 @@ from coneskin.core.errors import SkinConnectionError, SkinTimeout
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort
-from coneskin.skin.sources.source_group import SourceGroup
+from coneskin.skin.sources.source import SourceGroup
 from coneskin.skin.virtual.memory_source import MemorySource
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.testing.source_contract import SOURCE_CHECKS, OpenLine, OpenLineFactory, contract_bytes

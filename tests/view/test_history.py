@@ -11,9 +11,17 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import load_driver
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent
 from coneskin.runs.replay.run import read_run
-from coneskin.view.history import FADING, UNKNOWN, History, PhaseWords, _ContactLog, _phase_after
 from coneskin.view.panel import _envelope, _plots, event_list, state_of, status, timeline
-from coneskin.view.run_course import RunCourse, read_courses
+from coneskin.view.run_course import (
+    FADING,
+    UNKNOWN,
+    History,
+    PhaseWords,
+    RunCourse,
+    _ContactLog,
+    _phase_after,
+    read_courses,
+)
 from tests.support.paths import COLLISION
 
 RUN = COLLISION

@@ -6,9 +6,8 @@ from itertools import combinations
 import pytest
 
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
-from coneskin.view.history import PHASE_COLOURS
 from coneskin.view.panel import state_of, stop_entries, timeline
-from coneskin.view.run_course import RunCourse, read_courses
+from coneskin.view.run_course import PHASE_COLOURS, RunCourse, read_courses
 from coneskin.view.stage.level_scale import SHEET_COLOURS
 from tests.support.eyes import EYES, contrast
 from tests.support.paths import COLLISION

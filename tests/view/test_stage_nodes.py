@@ -18,9 +18,8 @@ from coneskin.core.recording.recorder import Recorder
 from coneskin.geometry.pose import Vector
 from coneskin.robot.guard.signals.journal import BlockKind, force_block
 from coneskin.runs.replay.run import Run
-from coneskin.view.history import History
 from coneskin.view.live_page import LivePage, LiveRun
-from coneskin.view.run_course import read_courses
+from coneskin.view.run_course import History, read_courses
 from coneskin.view.stage_nodes import StageNodes
 from tests.support.scenes import forearm_scene
 

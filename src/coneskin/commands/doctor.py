@@ -48,12 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--check", action="store_true", help="list what is in the scene; open and start nothing")
     add("--simulated", action="store_true", help="start a simulated controller at the scene's host")
     add("--no-touches", action="store_true", help="ask for no touches: the wires are not tried")
-    add(
-        "--measured",
-        type=Path,
-        metavar="FILE",
-        help="compare the scene with what scripts/measure_controller.py has seen",
-    )
+    help_text = "compare the scene with what scripts/measure_controller.py has seen"
+    add("--measured", type=Path, metavar="FILE", help=help_text)
     add("--yes", action="store_true", help="make the changes of the scene without asking")
     add("--json", action="store_true", help="print each finding as a JSON object, one per line")
 

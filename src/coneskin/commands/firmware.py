@@ -106,19 +106,8 @@ def _flash(sketch: Path, circuit: BoardCircuit, port: str) -> None:
     if board == "uno" and all(map(shutil.which, ("avr-gcc", "avrdude"))) and _AVR_CORE.is_dir():
         with TemporaryDirectory() as folder:
             program = _compile_for_uno(sketch, Path(folder))
-            words = [
-                "avrdude",
-                "-q",
-                "-p",
-                "atmega328p",
-                "-c",
-                "arduino",
-                "-P",
-                port,
-                "-D",
-                "-U",
-                f"flash:w:{program}:e",
-            ]
+            words = ["avrdude", "-q", "-p", "atmega328p", "-c", "arduino", "-P", port, "-D"]
+            words += ["-U", f"flash:w:{program}:e"]
             said: list[str] = []
             for baud in _BOOTLOADER_BAUDS:
                 if not (why := _said([*words, "-b", baud])):
@@ -135,15 +124,7 @@ def _flash(sketch: Path, circuit: BoardCircuit, port: str) -> None:
 
 
 def _compile_for_uno(sketch: Path, folder: Path) -> Path:
-    """Compile a sketch's folder for an Uno or Nano with Debian's Arduino core; return the program, an ELF file.
-
-    Args:
-        sketch: the folder ``coneskin``.
-        folder: where the program goes.
-
-    Raises:
-        SkinConnectionError: the compiler refuses it; the message is its own.
-    """
+    """Compile a sketch for an Uno with Debian's Arduino core, into a folder; return the program, an ELF file."""
     core, wire = _AVR_CORE / "cores/arduino", _AVR_CORE / "libraries/Wire/src"
     places = (core, _AVR_CORE / "variants/standard", _AVR_CORE / "libraries/EEPROM/src", wire, sketch)
     source, program = folder / "coneskin.cpp", folder / "coneskin.elf"

@@ -45,17 +45,11 @@ class Doubt(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Place on a sensor, and words by which a person finds it.
+    """Place on a sensor, and words by which a person finds it."""
 
-    Attributes:
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        where: the words.
-    """
-
-    u: float
-    phi: float
-    where: str
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth [rad]
+    where: str  #: the words
 
     @property
     def place(self) -> Place:

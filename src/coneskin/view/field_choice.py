@@ -142,21 +142,13 @@ _LOW_TO_HIGH = ((49, 18, 92), (44, 96, 160), (38, 152, 138), (122, 198, 80), (25
 
 
 class _FieldPatches(NamedTuple):
-    """Patches of a sheet, row by row along u.
+    """Patches of a sheet, row by row along u."""
 
-    Attributes:
-        u: slant distances of their middles [m], shape (n,).
-        phi: azimuths of them [rad], shape (n,).
-        positions: of the middles in the frame of the link [m], shape (n, 3).
-        rotations: w, x, y, z; a patch's x is around, its y along, shape (n, 4).
-        sizes: around, along, and 1 [m], shape (n, 3).
-    """
-
-    u: Floats
-    phi: Floats
-    positions: NDArray[np.float32]
-    rotations: NDArray[np.float32]
-    sizes: NDArray[np.float32]
+    u: Floats  #: slant distances of their middles [m], shape (n,)
+    phi: Floats  #: azimuths of them [rad], shape (n,)
+    positions: NDArray[np.float32]  #: of the middles in the frame of the link [m], shape (n, 3)
+    rotations: NDArray[np.float32]  #: w, x, y, z; a patch's x is around, its y along, shape (n, 4)
+    sizes: NDArray[np.float32]  #: around, along, and 1 [m], shape (n, 3)
 
     @classmethod
     def of(cls, sheet: SheetSurface) -> _FieldPatches:

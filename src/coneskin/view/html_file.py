@@ -21,7 +21,7 @@ from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline, trace_drawin
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars, level_words
 from .stage.stage import SheetSurface
-from .stage_nodes import StageNodes, look_at_stages
+from .stage_nodes import look_at_stages, nodes_of_runs
 
 _LEVEL_STEPS = 100  # of a level, which a bar can show
 
@@ -139,8 +139,7 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
         f"<title>coneskin: {escape(courses[0].stage.title)}</title><style>{_PAGE_STYLE}</style>"
         f'<script>window.__VISER_EMBED_DATA__="{embedded}";window.__VISER_EMBED_CONFIG__={{darkMode:false}};</script>'
     )
-    page = page_client()
-    page = page.replace("</head>", f"{head}</head>", 1)
+    page = page_client().replace("</head>", f"{head}</head>", 1)
     at = page.rindex("</body>")
     page = page[:at] + _panel(courses, since, until, pictures) + page[at:]
     with explain_os_error(RecordingError, f"cannot write {path}"):
@@ -172,10 +171,7 @@ def _serialized(courses: Sequence[RunCourse], since: float, pictures: Sequence[f
         reach = max(course.stage.reach for course in courses)
         look_at_stages(server, reach, len(courses))
         server.scene.set_up_direction("+z")
-        nodes = [
-            StageNodes(server.scene, course.stage, f"/run {number}", course.offset)
-            for number, course in enumerate(courses, 1)
-        ]
+        nodes = nodes_of_runs(server.scene, courses)
         before = 0.0
         for at in pictures:
             if at > before:

@@ -19,10 +19,9 @@ from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.replay.run import Run, read_header
 
 from .field_choice import FieldChoice
-from .history import UNKNOWN, History
 from .page_server import PageServer
 from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, stop_entries, timeline, trace_drawings
-from .run_course import Moment, RunCourse
+from .run_course import UNKNOWN, History, Moment, RunCourse
 from .stage.level_scale import level_bars
 from .stage.stage import Stage, set_stage
 from .stage_nodes import StageNodes, look_at_stages

@@ -17,8 +17,7 @@ from coneskin.core.text import printable
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way, stopping_contact
 
-from .history import CHANNELS, PHASE_COLOURS, PhaseWords, Series
-from .run_course import RunCourse
+from .run_course import CHANNELS, CONTACT_EVENTS, PHASE_COLOURS, PhaseWords, RunCourse, Series
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
@@ -188,7 +187,6 @@ def _line(text: str) -> str:
 _WIDTH, _BAND, _TICK, _GAP = 1000.0, 16.0, 8.0, 6.0
 #: height of a phase's band as a share: a shape, for those to whom its colour says nothing
 _BAND_SHARES = {"unknown": 0.25, "active": 0.5, "moving": 0.75, "stopped": 1.0}
-_CONTACT_EVENTS = {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED}
 _FAULT_EVENTS = {EventName.FAULT, EventName.GUARD_EXITED, EventName.GUARD_UNRESPONSIVE, EventName.STOP_FAILED}
 _MAX_TICKS = 400  # ticks; a run with more faults than pixels has one wherever one looks
 
@@ -223,9 +221,9 @@ def timeline(courses: Sequence[RunCourse], since: float, until: float) -> str:
                     f"<title>{escape(change.phase.text)}</title></rect>"
                 )
         shown = [event for event in course.history.events if since <= event.time - course.zero <= until]
-        for event in [event for event in shown if event.name in _CONTACT_EVENTS | _FAULT_EVENTS][-_MAX_TICKS:]:
+        for event in [event for event in shown if event.name in CONTACT_EVENTS | _FAULT_EVENTS][-_MAX_TICKS:]:
             x = (event.time - course.zero - since) * scale
-            colour, wide = ("#d646e0", 4) if event.name in _CONTACT_EVENTS else ("#111827", 2)
+            colour, wide = ("#d646e0", 4) if event.name in CONTACT_EVENTS else ("#111827", 2)
             parts.append(
                 f'<rect x="{x - 0.5 * wide:.2f}" y="{top:.1f}" width="{wide}" height="{_TICK}" fill="{colour}"/>'
             )

@@ -17,7 +17,7 @@ from .page_server import PageServer
 from .panel import NOTICE, PAGE_LEGEND, event_list, state_of, status, timeline, trace_drawings
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars
-from .stage_nodes import StageNodes, look_at_stages
+from .stage_nodes import look_at_stages, nodes_of_runs
 
 _PICTURE_PERIOD = 1.0 / 30.0  # s between two pictures
 _TEXT_PERIOD = 0.1  # s between two changes of the text
@@ -107,10 +107,7 @@ class _Player:
         self._playback = _Playback(_down(min(since for since, _ in spans)), -_down(-max(until for _, until in spans)))
         self._changed = threading.Condition()
         self._over = False
-        self._nodes = [
-            StageNodes(client.scene, course.stage, f"/run {number}", course.offset)
-            for number, course in enumerate(courses, 1)
-        ]
+        self._nodes = nodes_of_runs(client.scene, courses)
         lines = event_lines(courses)
         self._times = [time for time, _, _ in lines]
         self._lines = [(event, text) for _, event, text in lines]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from coneskin.geometry.pose import Pose, Vector
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
     from coneskin.geometry.placed_frustum import PlacedFrustum
 
-    from .history import ContactMark
     from .page_server import PageServer
-    from .run_course import Moment
+    from .run_course import ContactMark, Moment, RunCourse
     from .stage.solids import Solid
     from .stage.stage import Stage
 
@@ -126,6 +126,11 @@ class StageNodes:
         for nodes in left.values():
             for node in nodes:
                 node.hide()
+
+
+def nodes_of_runs(scene: Any, courses: Sequence[RunCourse]) -> list[StageNodes]:
+    """Return the nodes of runs, each below a node of its number: "/run 1", "/run 2" ..."""
+    return [StageNodes(scene, item.stage, f"/run {number}", item.offset) for number, item in enumerate(courses, 1)]
 
 
 class _MarkNodes:

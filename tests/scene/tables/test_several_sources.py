@@ -9,7 +9,7 @@ from coneskin.core.keys import Key
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.summary import summarize
 from coneskin.skin.sources.kinds import GROUP, SourceKind, open_source
-from coneskin.skin.sources.source_group import SourceGroup
+from coneskin.skin.sources.source import SourceGroup
 
 LINKS = """
 [[link]]

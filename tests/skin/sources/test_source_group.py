@@ -12,8 +12,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.events import TouchBegan
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.sources.source import Source
-from coneskin.skin.sources.source_group import SourceGroup, _FrameBoundary
+from coneskin.skin.sources.source import Source, SourceGroup, _FrameBoundary
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame, FrameDecoder

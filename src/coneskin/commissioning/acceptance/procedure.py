@@ -28,25 +28,15 @@ _SYSTEMATIC_PART = 0.5  # tolerances; an offset that all marks have together may
 
 @dataclass
 class SensorMarks:
-    """Marks of one sensor, and what has become of them.
+    """Marks of one sensor, and what has become of them."""
 
-    Attributes:
-        sensor: the sensor.
-        offered: all places that can be described.
-        plan: places to touch, those touched already first.
-        refused: places that a person cannot reach.
-        results: of those touched.
-        read: places that it read there.
-        cause: why it has failed; empty where it has not.
-    """
-
-    sensor: Sensor
-    offered: Sequence[Mark]
-    plan: tuple[Mark, ...] = ()
-    refused: list[Mark] = field(default_factory=list)
-    results: list[MarkResult] = field(default_factory=list)
-    read: list[Place] = field(default_factory=list)
-    cause: str = ""
+    sensor: Sensor  #: the sensor
+    offered: Sequence[Mark]  #: all places that can be described
+    plan: tuple[Mark, ...] = ()  #: places to touch, those touched already first
+    refused: list[Mark] = field(default_factory=list)  #: places that a person cannot reach
+    results: list[MarkResult] = field(default_factory=list)  #: of those touched
+    read: list[Place] = field(default_factory=list)  #: places that it read there
+    cause: str = ""  #: why it has failed; empty where it has not
 
     @property
     def failed(self) -> bool:

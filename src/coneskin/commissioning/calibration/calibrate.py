@@ -100,19 +100,12 @@ _VIRTUAL_PRESS = 4.0  # s of a press with a known force, likewise
 
 @dataclass(frozen=True, slots=True)
 class CalibrationResult:
-    """Result for one sensor.
+    """Result for one sensor."""
 
-    Attributes:
-        touches: of its marks.
-        fit: None where the sensor was refused.
-        record: to be added to the file of its device; None where it was refused.
-        refusal: why it cannot be calibrated; empty where it can.
-    """
-
-    touches: SensorTouches
-    fit: CalibrationFit | None = None
-    record: CalibrationRecord | None = None
-    refusal: str = ""
+    touches: SensorTouches  #: of its marks
+    fit: CalibrationFit | None = None  #: None where the sensor was refused
+    record: CalibrationRecord | None = None  #: to be added to the file of its device; None where it was refused
+    refusal: str = ""  #: why it cannot be calibrated; empty where it can
 
 
 class Calibrator:

@@ -29,19 +29,12 @@ _DOUBT_TIME = 3.0  # s of touch without a result, after which the person is told
 
 @dataclass
 class SensorTouches:
-    """Marks of one sensor, and the touches of them.
+    """Marks of one sensor, and the touches of them."""
 
-    Attributes:
-        sensor: the sensor.
-        marks: to touch.
-        touches: in the order in which they were made; one that was asked for again is in it twice.
-        repeated: places in ``touches`` that a later touch of the same mark replaces.
-    """
-
-    sensor: Sensor
-    marks: Sequence[Mark]
-    touches: list[KnownTouch] = field(default_factory=list)
-    repeated: set[int] = field(default_factory=set)
+    sensor: Sensor  #: the sensor
+    marks: Sequence[Mark]  #: to touch
+    touches: list[KnownTouch] = field(default_factory=list)  #: in their order
+    repeated: set[int] = field(default_factory=set)  #: places in ``touches`` that a later one of the same mark replaces
 
     @property
     def valid(self) -> list[int]:

@@ -10,9 +10,9 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from coneskin.commissioning.line.port_search import port_group
 from coneskin.commissioning.skin_watch import skin_source
@@ -31,6 +31,7 @@ from .wires import WirePatch, examine_wires
 if TYPE_CHECKING:
     from coneskin.commissioning.touching import Mark, Notice
     from coneskin.scene.values.scene import ArmScene, Scene, SourceScene
+    from coneskin.session.skin_client import SkinClient
     from coneskin.skin.sensor import Sensor
     from coneskin.skin.sources.source import Source
     from coneskin.skin.wire import Frame
@@ -42,16 +43,6 @@ _READ_TIMEOUT = 0.05  # s
 _START_TIME = 1.0  # s for the first bytes, after which the port counts as silent
 _TOUCH_TIMEOUT = 60.0  # s for a person to touch
 _TOUCH_FORCE, _TOUCH_TIME = 5.0, 3.0  # N and s, of the touches of a virtual skin
-
-
-class _Toucher(Protocol):
-    """What touches a virtual skin."""
-
-    def touch(self, u: float, phi: float, force: float, duration: float, sensor: str) -> object:
-        """Touch a sensor now, at u [m] and phi [rad], with a force [N], for a time [s]."""
-
-    def release(self) -> None:
-        """End the touches that there are now."""
 
 
 class Doctor:
@@ -133,7 +124,7 @@ class Doctor:
             except SkinConnectionError as exc:
                 self.note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
 
-    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: _Toucher | None = None) -> None:
+    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: SkinClient | None = None) -> None:
         """Examine what an open source sends, untouched and touched.
 
         Args:
@@ -159,7 +150,7 @@ class Doctor:
             self._examine_wires(source, sensor, statistics, toucher)
 
     def _examine_wires(
-        self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: _Toucher | None
+        self, source: Source, sensor: Sensor, untouched: SensorStatistics, toucher: SkinClient | None
     ) -> None:
         if not self._touches:
             self.note(Finding(f"{sensor.name}, wires", "not tried", "no touches were asked for"))
@@ -252,18 +243,12 @@ def _arm(scene: Scene, arm: ArmScene) -> list[Finding]:
 
 
 def _collect(source: Source, duration: float, clock: Callable[[], float]) -> SkinStatistics:
-    """Take what an open source sends for a time [s].
-
-    Raises:
-        SkinConnectionError: the source is gone.
-    """
+    """Take what an open source sends for a time [s]."""
     start = clock()
     seen, end = SkinStatistics(start), start + duration
     while (now := clock()) < end:
-        try:
+        with suppress(SkinTimeout):
             seen.add(clock(), source.read(min(_READ_TIMEOUT, end - now)))
-        except SkinTimeout:
-            continue
     return seen
 
 

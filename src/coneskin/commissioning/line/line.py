@@ -19,23 +19,14 @@ _PIECE_SIZE = 4096  # bytes of a file that are taken at once
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line to listen to; either a source or a file.
+    """A line to listen to; either a source or a file."""
 
-    Attributes:
-        name: for messages.
-        source: not open yet; None for a file.
-        path: of a file.
-        recorded: the file is a recording, which has the times of its bytes.
-        sensors: that a scene expects.
-        baud: rate of the port [1/s]; None where there is none.
-    """
-
-    name: str
-    source: Source | None = None
-    path: Path | None = None
-    recorded: bool = False
-    sensors: tuple[Sensor, ...] = ()
-    baud: int | None = None
+    name: str  #: for messages
+    source: Source | None = None  #: not open yet; None for a file
+    path: Path | None = None  #: of a file
+    recorded: bool = False  #: the file is a recording, which has the times of its bytes
+    sensors: tuple[Sensor, ...] = ()  #: that a scene expects
+    baud: int | None = None  #: rate of the port [1/s]; None where there is none
 
     def pieces(self) -> Iterator[tuple[float, bytes]]:
         """Yield the bytes of a file with their times [s]; all of them are 0 where the file has none.

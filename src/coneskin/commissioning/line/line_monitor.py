@@ -25,64 +25,36 @@ _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 @dataclass(frozen=True, slots=True)
 class _SensorReport:
-    """What one sensor sends.
+    """What one sensor sends."""
 
-    Attributes:
-        name: of the scene, or its numbers.
-        frames: valid frames since the beginning.
-        missing: frames that never came, by their sequence.
-        numbers: how the newest frames follow each other.
-        counts: of the newest frame, by field.
-        changed: fields that differ from the frame before.
-        expected: counts of the untouched sensor; empty without a scene.
-        level: how firmly it is touched, 0 to 1.
-        place: part of the length from end 1 and of the wrap from D, 0 to 1; None while it is not touched.
-        certain: the place is certain; False without a scene.
-        words: the place in words, or why there is none.
-        health: in a word or a sentence.
-        raw: bytes of the newest frame.
-        raw_changed: places in them that differ from the frame before.
-    """
-
-    name: str
-    frames: int
-    missing: int
-    numbers: FrameNumbers
-    counts: dict[str, int]
-    changed: frozenset[str]
-    expected: dict[str, int]
-    level: float
-    place: tuple[float, float] | None
-    certain: bool
-    words: str
-    health: str
-    raw: bytes
-    raw_changed: frozenset[int]
+    name: str  #: of the scene, or its numbers
+    frames: int  #: valid frames since the beginning
+    missing: int  #: frames that never came, by their sequence
+    numbers: FrameNumbers  #: how the newest frames follow each other
+    counts: dict[str, int]  #: of the newest frame, by field
+    changed: frozenset[str]  #: fields that differ from the frame before
+    expected: dict[str, int]  #: counts of the untouched sensor; empty without a scene
+    level: float  #: how firmly it is touched, 0 to 1
+    place: tuple[float, float] | None  #: part of the length from end 1 and of the wrap from D, 0 to 1; None: untouched
+    certain: bool  #: the place is certain; False without a scene
+    words: str  #: the place in words, or why there is none
+    health: str  #: in a word or a sentence
+    raw: bytes  #: bytes of the newest frame
+    raw_changed: frozenset[int]  #: places in them that differ from the frame before
 
 
 @dataclass(frozen=True, slots=True)
 class LineReport:
-    """What arrives on a line.
+    """What arrives on a line."""
 
-    Attributes:
-        diagnosis: what is wrong, if anything is.
-        time: since the beginning [s].
-        size: bytes since the beginning.
-        byte_rate: of the newest bytes [1/s].
-        skipped: bytes that belong to no frame.
-        crc_errors: frames with a wrong checksum.
-        sensors: that send.
-        newest: the newest bytes.
-    """
-
-    diagnosis: Finding
-    time: float
-    size: int
-    byte_rate: float
-    skipped: int
-    crc_errors: int
-    sensors: tuple[_SensorReport, ...]
-    newest: bytes
+    diagnosis: Finding  #: what is wrong, if anything is
+    time: float  #: since the beginning [s]
+    size: int  #: bytes since the beginning
+    byte_rate: float  #: of the newest bytes [1/s]
+    skipped: int  #: bytes that belong to no frame
+    crc_errors: int  #: frames with a wrong checksum
+    sensors: tuple[_SensorReport, ...]  #: that send
+    newest: bytes  #: the newest bytes
 
 
 class _Heard:

@@ -25,25 +25,15 @@ _CHAMFER_SHARE = 0.16  # of the radius, at the rims of a barrel
 
 
 class Solid(NamedTuple):
-    """Surface of triangles.
+    """Surface of triangles."""
 
-    Attributes:
-        name: for people, and in the page's tree of nodes.
-        link: index of the DH frame that it moves with.
-        vertices: in that frame [m], shape (n, 3).
-        faces: indices of vertices, counter-clockwise from outside, shape (m, 3).
-        colour: red, green and blue, 0 to 255.
-        closed: nobody sees its inside, which then is not drawn; False for a mesh of unknown quality.
-        opacity: 1 hides what is behind; less for what would hide a sheet.
-    """
-
-    name: str
-    link: int
-    vertices: Floats
-    faces: Ints
-    colour: tuple[int, int, int]
-    closed: bool = False
-    opacity: float = 1.0
+    name: str  #: for people, and in the page's tree of nodes
+    link: int  #: index of the DH frame that it moves with
+    vertices: Floats  #: in that frame [m], shape (n, 3)
+    faces: Ints  #: indices of vertices, counter-clockwise from outside, shape (m, 3)
+    colour: tuple[int, int, int]  #: red, green and blue, 0 to 255
+    closed: bool = False  #: nobody sees its inside, which then is not drawn; False for a mesh of unknown quality
+    opacity: float = 1.0  #: 1 hides what is behind; less for what would hide a sheet
 
 
 def revolve(profile: Sequence[tuple[float, float]], segments: int = _SEGMENT_COUNT) -> tuple[Floats, Ints]:
@@ -98,18 +88,23 @@ def barrel(
 
 def joined(solids: Sequence[Solid]) -> list[Solid]:
     """Return solids with those of one link that look alike joined into one: each is a call of the drawing process."""
-    import numpy as np
-
     groups: dict[tuple[object, ...], list[Solid]] = {}
     for solid in solids:
         groups.setdefault((solid.link, solid.colour, solid.closed, solid.opacity), []).append(solid)
     found = []
     for group in groups.values():
-        starts = np.cumsum([0, *(len(solid.vertices) for solid in group)])
-        faces = [start + solid.faces for start, solid in zip(starts, group, strict=False)]
-        vertices = np.concatenate([solid.vertices for solid in group])
-        found.append(group[0]._replace(vertices=vertices, faces=np.concatenate(faces)))
+        vertices, faces = put_together([(solid.vertices, solid.faces) for solid in group])
+        found.append(group[0]._replace(vertices=vertices, faces=faces))
     return found
+
+
+def put_together(pieces: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
+    """Return vertices and faces of several surfaces as those of one."""
+    import numpy as np
+
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = [start + faces for start, (_, faces) in zip(starts, pieces, strict=False)]
+    return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
 
 
 _SHELL_COLOUR = (201, 205, 210)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.geometry.pose import Pose, Vector
 
-from .solids import Solid, body_solids
+from .solids import Solid, body_solids, put_together
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
@@ -32,31 +32,18 @@ _RIM_WIDTH, _RIM_ABOVE = 0.005, 0.0006  # m; of the band that shows where the ac
 
 
 class SheetSurface(NamedTuple):
-    """Active area of a sensor.
+    """Active area of a sensor."""
 
-    Attributes:
-        name: of the sensor.
-        link: index of the DH frame that it moves with.
-        vertices: in that frame [m], shape (n, 3).
-        faces: indices of vertices, shape (m, 3).
-        rim_vertices: of a narrow band inside of the active area's edges, in that frame [m], shape (k, 3).
-        rim_faces: indices of those vertices, shape (l, 3).
-        touch_level: from which the sensor is touched.
-        slimmest: the least radius of its link there [m].
-        sensor: with its electronics, and what force its level stands for.
-        item: its place on the arm.
-    """
-
-    name: str
-    link: int
-    vertices: Floats
-    faces: Ints
-    rim_vertices: Floats
-    rim_faces: Ints
-    touch_level: float
-    slimmest: float
-    sensor: Sensor
-    item: SensorOnArm
+    name: str  #: of the sensor
+    link: int  #: index of the DH frame that it moves with
+    vertices: Floats  #: in that frame [m], shape (n, 3)
+    faces: Ints  #: indices of vertices, shape (m, 3)
+    rim_vertices: Floats  #: of a narrow band inside of the active area's edges, in that frame [m], shape (k, 3)
+    rim_faces: Ints  #: indices of those vertices, shape (l, 3)
+    touch_level: float  #: from which the sensor is touched
+    slimmest: float  #: the least radius of its link there [m]
+    sensor: Sensor  #: with its electronics, and what force its level stands for
+    item: SensorOnArm  #: its place on the arm
 
     @classmethod
     def of(cls, item: SensorOnArm, sensor: Sensor) -> SheetSurface:
@@ -73,24 +60,9 @@ class SheetSurface(NamedTuple):
         width, turn = min(_RIM_WIDTH, cone.slant), min(_RIM_WIDTH / largest, cone.wrap)
         bands = [(u[[0]] + (0.0, width), phi), (u[[-1]] - (width, 0.0), phi)]
         bands += [(u, phi[[0]] + (0.0, turn)), (u, phi[[-1]] - (turn, 0.0))]
-        rim_vertices, rim_faces, before = [], [], 0
-        for along, around in bands:
-            points, triangles = _strip(item, along, around, _SHEET_HEIGHT + _RIM_ABOVE)
-            rim_vertices.append(points)
-            rim_faces.append(before + triangles)
-            before += len(points)
-        return cls(
-            item.name,
-            item.link,
-            vertices,
-            faces,
-            np.concatenate(rim_vertices),
-            np.concatenate(rim_faces),
-            sensor.thresholds.touch_level,
-            0.97 * min(cone.radius1, cone.radius2),
-            sensor,
-            item,
-        )
+        rim = put_together([_strip(item, along, around, _SHEET_HEIGHT + _RIM_ABOVE) for along, around in bands])
+        level, slimmest = sensor.thresholds.touch_level, 0.97 * min(cone.radius1, cone.radius2)
+        return cls(item.name, item.link, vertices, faces, *rim, level, slimmest, sensor, item)
 
 
 def _strip(item: SensorOnArm, u: Floats, phi: Floats, above: float) -> tuple[Floats, Ints]:
@@ -183,23 +155,14 @@ _SHELL_COLOUR = (201, 205, 210)
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """What is drawn once.
+    """What is drawn once."""
 
-    Attributes:
-        title: for people.
-        model: of the arm; None where the scene has none.
-        solids: of the arm.
-        sheets: on it.
-        bodies: around it, part by part, in the base frame where the scene puts them.
-        starts: the places of those parts there [m].
-    """
-
-    title: str
-    model: ArmModel | None
-    solids: tuple[Solid, ...]
-    sheets: tuple[SheetSurface, ...]
-    bodies: tuple[Solid, ...] = ()
-    starts: tuple[Vector, ...] = ()
+    title: str  #: for people
+    model: ArmModel | None  #: of the arm; None where the scene has none
+    solids: tuple[Solid, ...]  #: of the arm
+    sheets: tuple[SheetSurface, ...]  #: on it
+    bodies: tuple[Solid, ...] = ()  #: around it, part by part, in the base frame where the scene puts them
+    starts: tuple[Vector, ...] = ()  #: the places of those parts there [m]
 
     @property
     def links(self) -> tuple[int, ...]:
