@@ -2,9 +2,10 @@
 
 Every public method of `Builtins`, inherited ones included, is one such function under its URScript name and with its
 argument names; one that takes time is a generator. The mass matrix and the Coriolis torques are those of the bare arm;
-outer joint torques are NaN.
+outer joint torques are NaN. A contact is never found, freedrive holds the arm, and measured forces are 0, or what a
+client gives by RTDE instead of a sensor.
 
-Source: Universal Robots, "The URScript Programming Language", modules motion and internals.
+Source: Universal Robots, "The URScript Programming Language", modules motion, internals and interfaces.
 """
 
 from __future__ import annotations
@@ -23,9 +24,8 @@ from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.value_functions import MAX_LINE, ValueFunctions, written
-from coneskin.robot.sim.urscript.values import Array, PoseValue, number, numbers, pose_of, show, values_of
+from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show, values_of
 
-from .force_functions import ForceFunctions
 from .io_functions import IoFunctions, add_host_functions, index_of
 from .moves import MoveFunctions, Wait
 from .socket_functions import SocketFunctions
@@ -34,7 +34,7 @@ from .states import PopupNotice, TextNotice
 _NOT_SIMULATED = (math.nan,) * 6  # value of what is not simulated, for six joints
 
 
-class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, ValueFunctions):
+class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
     """All URScript functions, bound to one program of one controller."""
 
     @classmethod
@@ -169,6 +169,61 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ForceFunctions, Valu
         """Return the temperature of a joint [degrees Celsius]: a constant."""
         index_of(j, 6)
         return 30.0
+
+    # forces, in a world where nothing touches the arm: what would move it even so is told, and it holds
+
+    def tool_contact(self, direction: Any = None) -> int:
+        """Return 0: no contact."""
+        if direction is not None:
+            numbers(direction, 6, "a direction")
+        return 0
+
+    def enable_external_ft_sensor(self, enable: Any, *_: Any, **__: Any) -> None:
+        """Take forces and torques from RTDE's external_force_torque."""
+        self._host.inputs.external_forces = bool(enable)
+
+    ft_rtde_input_enable = enable_external_ft_sensor
+
+    def force_mode(self, task_frame: Any, selection_vector: Any, wrench: Any, type: Any, limits: Any) -> None:
+        """Follow forces along the selected axes: nothing touches the arm, and it holds."""
+        numbers(task_frame, 6, "a task frame")
+        numbers(limits, 6, "limits")
+        if int(type) not in (1, 2, 3):
+            raise ScriptError(f"the type of a force mode is 1, 2 or 3, got {show(type)}")
+        selected = numbers(selection_vector, 6, "a selection vector")
+        if any(on and wanted for on, wanted in zip(selected, numbers(wrench, 6, "a wrench"), strict=True)):
+            self._tell_not_simulated("the motion of force_mode with a wanted force; the arm holds")
+
+    def force_mode_set_damping(self, damping: float) -> None:
+        """Set the damping of force mode, 0..1: no effect."""
+        self._program.damping = min(1.0, max(0.0, number(damping, "a damping")))
+
+    def force_mode_get_damping(self) -> float:
+        """Return the damping of force mode."""
+        return self._program.damping
+
+    def force_mode_set_gain_scaling(self, scaling: float) -> None:
+        """Set the gain of force mode, 0..2: no effect."""
+        self._program.gain_scaling = min(2.0, max(0.0, number(scaling, "a scaling")))
+
+    def force_mode_get_gain_scaling(self) -> float:
+        """Return the gain of force mode."""
+        return self._program.gain_scaling
+
+    def direct_torque(
+        self, torque: Any, friction_comp: Any = 0, viscous_scale: Any = 0, coulomb_scale: Any = 0
+    ) -> Wait:
+        """Let torques act on the joints for a cycle, beside gravity [N m]: the arm holds."""
+        del friction_comp, viscous_scale, coulomb_scale
+        wanted = numbers(torque, 6, "joint torques")
+        self._program.drive()
+        if any(wanted):
+            self._tell_not_simulated("the motion by direct_torque; the arm holds")
+        yield
+
+    def set_gravity(self, d: Any) -> None:
+        """Set the direction of gravity [m/s^2]: no effect on an arm that follows its path exactly."""
+        self._host.gravity = tuple(numbers(d, 3, "gravity"))
 
     # safety and payload
 

@@ -17,6 +17,9 @@ from coneskin.robot.sim.motion.path import JointLine, Path, ToolArc, ToolLine
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show
 
 from .script_host import CallingProgram, ScriptHost
+from .states import WARNING_REPORT, ErrorNotice
+
+_NOT_SIMULATED = 0  # number of a log entry that only this simulator writes
 
 Wait = Generator[None, None, None]
 
@@ -28,6 +31,13 @@ class MoveFunctions:
         self._host = host
         self._arm = host.arm
         self._program = program
+
+    def _tell_not_simulated(self, what: str) -> None:
+        """Tell log and clients, once for each program."""
+        if what not in self._program.told:
+            self._program.told.add(what)
+            self._host.log("not_simulated", what=what)
+            self._host.tell(ErrorNotice(_NOT_SIMULATED, 0, WARNING_REPORT, f"not simulated: {what}"))
 
     def _move(self, make: Callable[[], Motion], radius: float = 0.0, **what: Any) -> Wait:
         """Let a motion drive the arm until it is done, or as close to its goal as the blend radius [m]."""
@@ -98,23 +108,17 @@ class MoveFunctions:
 
     def optimovej(self, goal: Any, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Wait:
         """Move in a straight line in joint space, at shares of what the joints are able to do."""
-        a, v = _shares(a, v)
-        (r,) = _numbers(r)
-        q = self._joints(goal)
-        largest = v * max(self._arm.model.joint_speed)  # the line itself heeds what each joint can do
-        limits = [v * limit for limit in self._arm.model.joint_speed]
-        yield from self._move(
-            lambda: JointLine(self._arm, q, a * JOINT_ACCELERATION, largest, limits=limits),
-            r,
-            target=list(goal),
-            a=a,
-            v=v,
-        )
+        (a, v), (r,) = _shares(a, v), _numbers(r)
+        q, limits = self._joints(goal), [v * limit for limit in self._arm.model.joint_speed]
+
+        def make() -> Motion:  # the line itself heeds what each joint can do
+            return JointLine(self._arm, q, a * JOINT_ACCELERATION, max(limits), limits=limits)
+
+        yield from self._move(make, r, target=list(goal), a=a, v=v)
 
     def optimovel(self, goal: Any, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Wait:
         """Move the tool in a straight line, at shares of what the joints are able to do."""
-        a, v = _shares(a, v)
-        (r,) = _numbers(r)
+        (a, v), (r,) = _shares(a, v), _numbers(r)
         pose = self._pose(goal)
 
         def make() -> Motion:
@@ -148,28 +152,24 @@ class MoveFunctions:
         """Move at joint speeds; return after t, or, without t, when the speed is reached."""
         qd = numbers(qd, 6, "joint speeds")
         a, t = _numbers(a, t)
-        self._program.drive()
-        motion = self._arm.motion
-        if not isinstance(motion, SpeedJoints):
-            motion = SpeedJoints(qd, a)
-            self._host.log("motion", kind="SpeedJoints", program=self._program.name, target=qd, a=a)
-        elif motion.target != qd:
-            self._host.log("retarget", kind="SpeedJoints", target=qd, a=a)
-            motion.retarget(qd, a)
-        yield from self._sustain(motion, t)
+        yield from self._go_at(SpeedJoints, lambda: SpeedJoints(qd, a), t, qd, a)
 
     def speedl(self, xd: Any, a: float = 1.2, t: float = 0.0, aRot: float | None = None) -> Wait:
         """Move the tool at a velocity; return after t, or, without t, when the velocity is reached."""
         xd = numbers(xd, 6, "a tool velocity")
         a, t, aRot = _numbers(a, t, a if aRot is None else aRot)
+        yield from self._go_at(SpeedTool, lambda: SpeedTool(self._arm, xd, a, aRot), t, xd, a, aRot)
+
+    def _go_at(self, kind: Any, make: Callable[[], Any], t: float, target: list[float], a: float, *more: float) -> Wait:
+        """Go on at a speed, or begin to; see `_sustain`."""
         self._program.drive()
-        motion, angular = self._arm.motion, aRot
-        if not isinstance(motion, SpeedTool):
-            motion = SpeedTool(self._arm, xd, a, angular)
-            self._host.log("motion", kind="SpeedTool", program=self._program.name, target=xd, a=a)
-        elif motion.target != xd:
-            self._host.log("retarget", kind="SpeedTool", target=xd, a=a)
-            motion.retarget(xd, a, angular)
+        motion: Any = self._arm.motion
+        if not isinstance(motion, kind):
+            motion = make()
+            self._host.log("motion", kind=kind.__name__, program=self._program.name, target=target, a=a)
+        elif motion.target != target:
+            self._host.log("retarget", kind=kind.__name__, target=target, a=a)
+            motion.retarget(target, a, *more)
         yield from self._sustain(motion, t)
 
     def servoj(
@@ -200,20 +200,20 @@ class MoveFunctions:
     def stopj(self, a: float = 2.0) -> Wait:
         """Slow down all joints in proportion; return at standstill, at once if the arm stands."""
         (a,) = _numbers(a)
-        yield from self._stop(StopJoints, lambda: StopJoints(a), a)
+        yield from self._stop(StopJoints(a), a)
 
     def stopl(self, a: float = 20.0, aRot: float | None = None) -> Wait:
         """Slow down the tool; return at standstill, at once if the arm stands."""
         a, aRot = _numbers(a, a if aRot is None else aRot)
-        yield from self._stop(StopTool, lambda: StopTool(self._arm, a, aRot), a)
+        yield from self._stop(StopTool(self._arm, a, aRot), a)
 
-    def _stop(self, kind: type[Motion], make: Callable[[], Motion], a: float) -> Wait:
+    def _stop(self, stop: Motion, a: float) -> Wait:
         self._program.drive()
         if self._arm.moving:
-            yield from self._move(make, a=a)
+            yield from self._move(lambda: stop, a=a)
         else:
             self._arm.motion = None
-            self._host.log("motion", kind=kind.__name__, program=self._program.name, a=a, moving=False)
+            self._host.log("motion", kind=type(stop).__name__, program=self._program.name, a=a, moving=False)
 
     def set_pos(self, q: Any) -> None:
         """Put a simulated arm that stands at joint positions, without a motion."""
