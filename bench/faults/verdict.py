@@ -48,7 +48,7 @@ def judge_recording(path: Path, fault_at: float, active_at: float, touched: bool
     if missing := _missing_frames(run, active_at, fault_at):
         yield f"{missing} frames before the fault are not in the recording"
     again = run.replay()
-    if not again.agrees:
+    if again.differences:
         yield f"its replay is another: {again.differences[:1]}"
 
 

@@ -96,7 +96,7 @@ def _judge(hurt: bytes, data: bytes, whole: list[Chunk], folder: Path, again: bo
             yield "replayed"
             if result.verdict is Verdict.SAME:
                 yield "same"
-            if result.agrees:
+            if not result.differences:
                 yield "agrees"
     except ConeSkinError:
         yield "unreadable"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Mapping
 from importlib import import_module
-from typing import Any, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
+from typing import Any, NamedTuple, Protocol, Self, TypeVar, cast, runtime_checkable
 
 from coneskin.core.errors import RobotRefused
 from coneskin.core.finding import Finding
@@ -277,5 +277,4 @@ def require(driver: ArmDriver, tier: Callable[..., _Tier]) -> _Tier:
         raise RobotRefused(
             f'this arm\'s driver cannot {_TIER_WORDS[tier]}; reaction = "stop" with control = "external" works'
         )
-    found: Any = driver
-    return found  # type: ignore[no-any-return]
+    return cast(_Tier, driver)

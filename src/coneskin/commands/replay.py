@@ -33,7 +33,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RecordingError, SceneError
 from coneskin.core.progress import ProgressBar
-from coneskin.core.text import printable
+from coneskin.core.text import finite, printable
 
 if TYPE_CHECKING:
     from coneskin.runs.replay.run import Replay
@@ -191,7 +191,7 @@ def _replay_many(args: argparse.Namespace, paths: Sequence[Path]) -> int:
 
         draw_variants(scores, args.picture)
     if args.json:
-        print(json.dumps({"runs": rows, "variants": [score.facts() for score in scores]}))
+        print(json.dumps({"runs": rows, "variants": [finite(score._asdict()) for score in scores]}))
     else:
         _report_runs(rows, varied=variants != [{}])
         print(printable("\n".join(variant_lines(scores))))

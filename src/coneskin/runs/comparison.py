@@ -269,13 +269,11 @@ def _without_beginning(*sides: list[GuardEvent]) -> Iterator[list[GuardEvent]]:
     """Leave out how the guard of a cut became active, and what a guard learns before that."""
     until = max(next((e.time for e in side if e.name == EventName.ACTIVATED), -math.inf) for side in sides)
     for side in sides:
-        yield [_unlearned(event) for event in side if event.name not in _START_EVENTS or event.time > until]
-
-
-def _unlearned(event: GuardEvent) -> GuardEvent:
-    return event._replace(
-        details={name: value for name, value in event.details.items() if name not in _LEARNED_DETAILS}
-    )
+        yield [
+            event._replace(details={k: value for k, value in event.details.items() if k not in _LEARNED_DETAILS})
+            for event in side
+            if event.name not in _START_EVENTS or event.time > until
+        ]
 
 
 def _comparable(events: Sequence[GuardEvent], diverged: float) -> list[GuardEvent]:

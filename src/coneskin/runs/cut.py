@@ -24,7 +24,6 @@ from coneskin.robot.driver.messages import Release, StatusReport
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
     BlockKind,
-    Command,
     EventName,
     GuardEvent,
     Output,
@@ -143,18 +142,10 @@ def cut_run(
         lead *= 2.0
     active = next((e.time for e in part.events if e.name == EventName.ACTIVATED), math.inf) < contacts[0].time
     there, here = (_reaction(item.events, contacts[0].time, until) for item in (all_of_it, all_of_part))
-    differs = active and there != here
+    other = f"{', '.join(here) or 'nothing'}; in the whole run {', '.join(there) or 'nothing'}"
     _record(target, Block(BlockKind.HEADER, since, json.dumps(header).encode()), blocks)
-    return _CutRun(
-        target,
-        target.stat().st_size,
-        inputs[0].time - start,
-        inputs[-1].time - start,
-        len(contacts),
-        comparison,
-        active,
-        f"{', '.join(here) or 'nothing'}; in the whole run {', '.join(there) or 'nothing'}" if differs else "",
-    )
+    size, span = target.stat().st_size, (inputs[0].time - start, inputs[-1].time - start)
+    return _CutRun(target, size, *span, len(contacts), comparison, active, other if active and there != here else "")
 
 
 def _reaction(events: Sequence[GuardEvent], since: float, until: float) -> list[str]:
@@ -207,17 +198,11 @@ def _written(run: Run, since: float, until: float) -> list[Block]:
             commands = [output for output in outputs if not isinstance(output, GuardEvent)]
             blocks += [Block(BlockKind.COMMAND, taken.time, encode_command(command, process)) for command in commands]
             blocks += [output.block() for output in outputs if isinstance(output, GuardEvent)]
-            queue += _acknowledgements(commands, taken.time)
+            releases = (command for command in commands if isinstance(command, Release))
+            acknowledgements = (StatusReport("released", str(release.number)) for release in releases)
+            queue += [Block(BlockKind.DRIVER, taken.time, report.encode()) for report in acknowledgements]
             outputs.clear()
     return blocks
-
-
-def _acknowledgements(commands: list[Command], time: float) -> list[Block]:
-    return [
-        Block(BlockKind.DRIVER, time, StatusReport("released", str(command.number)).encode())
-        for command in commands
-        if isinstance(command, Release)
-    ]
 
 
 def _cut_inputs(run: Run, since: float, until: float, ready: bool) -> Iterator[Block]:

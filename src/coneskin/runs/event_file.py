@@ -25,6 +25,7 @@ from .replay.event_details import Tolerances
 from .replay.run import read_run
 
 _MAX_SIZE = 1 << 28  # bytes
+_GOLDEN_SUFFIX = ".events.json"  # of golden events, beside the recording
 
 
 def event_facts(events: Iterable[GuardEvent], start: float) -> list[dict[str, Any]]:
@@ -33,14 +34,7 @@ def event_facts(events: Iterable[GuardEvent], start: float) -> list[dict[str, An
 
 
 def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
-    """Return the events of a guard in ``{"events": [{"t": ..., "name": ..., ...}]}``, without those of the session.
-
-    Args:
-        start: host time of their zero [s].
-
-    Raises:
-        RecordingError: the values are nothing of the kind.
-    """
+    """Return a guard's events in ``{"events": [{"t": ..., "name": ..., ...}]}``, whose zero is a host time [s]."""
     try:
         events = []
         for item in facts["events"]:
@@ -56,7 +50,6 @@ def _parse_events(facts: Any, start: float, where: str) -> list[GuardEvent]:
 
 
 def _read_events(path: Path, start: float) -> list[GuardEvent]:
-    """Return the events in a file; arguments and errors as of ``parse_events``."""
     with explain_os_error(RecordingError, f"cannot read the events {path}"):
         data = read_file(path, _MAX_SIZE)
     try:
@@ -67,19 +60,10 @@ def _read_events(path: Path, start: float) -> list[GuardEvent]:
 
 
 def _write_events(path: Path, events: Iterable[GuardEvent], start: float) -> None:
-    """Write events into a file, one a line, so that a review sees which have changed; it is replaced at once, or not.
-
-    Raises:
-        RecordingError: the file cannot be written.
-    """
+    """Write events into a file, one a line, so that a review sees which have changed."""
     lines = ",\n".join(json.dumps(item) for item in event_facts(events, start))
     with explain_os_error(RecordingError, f"cannot write the events {path}"):
         write_whole(path, f'{{"events": [\n{lines}\n]}}\n')
-
-
-def _golden_path(recording: Path) -> Path:
-    """Return the file of a recording's golden events: ``run.events.json`` of ``run.rec``."""
-    return recording.with_suffix(".events.json")
 
 
 def check_golden(recording: Path, tolerances: Tolerances | None = None) -> Comparison:
@@ -95,7 +79,7 @@ def check_golden(recording: Path, tolerances: Tolerances | None = None) -> Compa
 def _compare_golden(
     recording: Path, recorded: Decisions, again: Decisions, tolerances: Tolerances | None
 ) -> Comparison:
-    golden = _golden_path(recording)
+    golden = recording.with_suffix(_GOLDEN_SUFFIX)
     if not golden.is_file():
         return compare_decisions(recorded, again, tolerances)
     events = _read_events(golden, recorded.start)
@@ -108,7 +92,7 @@ def update_golden(recording: Path, tolerances: Tolerances | None = None) -> Path
     recorded, again = _decide(recording)
     if _compare_golden(recording, recorded, again, tolerances).same:
         return None
-    golden = _golden_path(recording)
+    golden = recording.with_suffix(_GOLDEN_SUFFIX)
     _write_events(golden, without_invented(again, recorded).events, recorded.start)
     return golden
 

@@ -86,7 +86,6 @@ class _RecordedRunFile(pytest.File):
     """Recording, as pytest collects it."""
 
     def collect(self) -> Iterator[pytest.Item]:
-        """Yield its one test."""
         yield _RecordedRunItem.from_parent(self, name="golden")
 
 

@@ -39,10 +39,6 @@ def _open_zmq(host: str, port: int) -> _Channel:
     """Bind a PUB socket, which drops a message for which a subscriber is too slow.
 
     A message has two parts, the event's name, by which subscribers choose, and the JSON.
-
-    Raises:
-        SceneError: the address is taken, or not one of this computer.
-        MissingExtra: pyzmq is not installed.
     """
     try:
         import zmq
@@ -74,12 +70,7 @@ _MAX_TOPIC = 1000  # letters; a broker takes 65 535 bytes
 
 
 def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str | None) -> _Channel:
-    """Connect to a broker, and again where the connection is lost. An event's topic is ``topic`` and its name.
-
-    Raises:
-        SceneError: no broker answers, or it refuses.
-        MissingExtra: paho-mqtt is not installed.
-    """
+    """Connect to a broker, and again where the connection is lost. An event's topic is ``topic`` and its name."""
     try:
         from paho.mqtt.client import Client, MQTTMessageInfo
         from paho.mqtt.enums import CallbackAPIVersion

@@ -36,11 +36,7 @@ def _arm_lock(
     wait: Callable[[float], None] = time.sleep,
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[None]:
-    """Lock the arm of one controller, which another guard may take a time [s] to leave; on Linux alone.
-
-    Raises:
-        RobotRefused: another guard of this computer has the arm.
-    """
+    """Lock the arm of one controller, which another guard may take a time [s] to leave; on Linux alone."""
     if sys.platform != "linux":
         yield
         return

@@ -65,13 +65,8 @@ def guard(
         RobotConnectionError: on entering, where the controller cannot be reached.
         SkinConnectionError: on entering, where the port cannot be opened.
     """
-    return Session(
-        scene if isinstance(scene, Scene) else load_scene(scene),
-        None if recording is None else Path(recording),
-        on_event,
-        start_timeout,
-        pressed_by,
-    )
+    read = scene if isinstance(scene, Scene) else load_scene(scene)
+    return Session(read, None if recording is None else Path(recording), on_event, start_timeout, pressed_by)
 
 
 class Session:
@@ -328,11 +323,7 @@ class Session:
 
 
 def _defer_interrupts(job: Callable[[], None]) -> None:
-    """Do a job to its end, and raise an interrupt only then; the job must have an end.
-
-    Raises:
-        KeyboardInterrupt: a person, or SIGTERM, has interrupted meanwhile; the job is done nevertheless.
-    """
+    """Do a job to its end, which it must have, and raise only then the interrupt of a person, or of SIGTERM."""
     noted: list[int] = []
     before = {}
     if threading.current_thread() is threading.main_thread():  # interrupts are raised, and can be caught, in it alone

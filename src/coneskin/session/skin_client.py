@@ -97,9 +97,8 @@ class SkinClient:
     def _name(self, wanted: str | int) -> str:
         if wanted == "":
             return self._sensors[0].name
-        ids = () if isinstance(wanted, bool) else tuple(sensor.sensor_id for sensor in self._sensors)
-        found = [sensor.name for sensor in self._sensors if wanted == sensor.name]
-        found += [sensor.name for sensor, number in zip(self._sensors, ids, strict=False) if wanted == number]
+        known_by_id = type(wanted) is int  # no bool
+        found = [s.name for s in self._sensors if wanted == s.name or (known_by_id and wanted == s.sensor_id)]
         if len(found) != 1:  # sensors of two devices may have one id
             known = ", ".join(f"{sensor.name} (id {sensor.sensor_id})" for sensor in self._sensors)
             raise SensorError(f"touch.sensor must be one of {known}, got {wanted!r}")

@@ -189,12 +189,10 @@ def _set_payload(arm: ArmClient, mass: float, cog: Sequence[float] = (0.0, 0.0, 
 
 
 def _ask(name: str) -> _Method:
-    """Return the method that asks the controller a question which moves nothing."""
     return _Method(lambda arm, *values: arm.ask(name, *values), f'ask("{name}", ...)', "while the arm stands")
 
 
 def _read(variable: str) -> _Method:
-    """Return the method that reads a variable of the controller's states."""
 
     def read(arm: ArmClient) -> Any:
         value = arm.states.value(variable)
@@ -209,12 +207,10 @@ def _is_steady(arm: ArmClient) -> bool:
 
 
 def _bit(variable: str) -> Callable[[ArmClient, int], bool]:
-    """Return a function that tells whether a bit of a variable is set."""
     return lambda arm, n: bool(arm.states.value(variable) >> n & 1)
 
 
 def _set_digital(group: str) -> _Method:
-    """Return the method that switches the digital outputs of a group."""
     switch = _true(lambda arm, number, on: arm.outputs.set_digital(number, on, group))
     return _Method(switch, f'outputs.set_digital(..., "{group}")')
 
@@ -226,7 +222,6 @@ def _set_analog(kind: str) -> _Method:
 
 
 def _set_register(number_type: type) -> _Method:
-    """Return the method that writes whole numbers, or floats, into input registers."""
     write = _true(lambda arm, number, value: arm.outputs.set_register(number, number_type(value)))
     return _Method(write, "outputs.set_register")
 

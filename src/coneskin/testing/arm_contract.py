@@ -128,7 +128,6 @@ def _check_a_path_that_there_is_not_is_refused(open_arm: OpenArm) -> None:
 
 
 def _check_nonsense_is_an_error(open_arm: OpenArm) -> None:
-    """Check that a payload that is none, or is cut, is never a state."""
     with open_arm() as arm, arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader:
         payloads: list[bytes] = []
         while not payloads:
@@ -179,7 +178,6 @@ def _check_a_lost_controller_is_an_error_and_stays_one(open_arm: OpenArm) -> Non
 
 
 def _check_closing_twice_is_fine_and_reading_then_is_not(open_arm: OpenArm) -> None:
-    """Check that closed connections stay closed."""
     with (
         open_arm() as arm,
         arm.driver.state_reader(arm.host, _CHECK_TIMEOUT) as reader,

@@ -235,14 +235,6 @@ class _Hole:
     def defect(self, kind: DefectKind) -> Defect:
         chunks = None if self.following is None else self.following - self.first
         all_known = self.known == chunks if chunks is not None else self.known > 0
-        return Defect(
-            kind,
-            self.since,
-            self.until,
-            self.offset,
-            self.size,
-            chunks,
-            self.blocks,
-            _kinds_of(self.kinds) if all_known else None,
-            "" if self.path is None else self.path.name,
-        )
+        kinds = _kinds_of(self.kinds) if all_known else None
+        note = "" if self.path is None else self.path.name
+        return Defect(kind, self.since, self.until, self.offset, self.size, chunks, self.blocks, kinds, note)

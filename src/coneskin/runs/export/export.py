@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
@@ -72,15 +72,9 @@ class _Column:
         final = np.result_type(*(dtype for dtype, _ in self._parts))
         head = {"descr": np.lib.format.dtype_to_descr(final), "fortran_order": False, "shape": (self.rows,)}
         np.lib.format.write_array_header_1_0(file, head)
-        for array in self._stored():
-            file.write(array.astype(final).tobytes())
-
-    def _stored(self) -> Iterator[NDArray[Any]]:
-        import numpy as np
-
-        with self._path.open("rb") as file:
+        with self._path.open("rb") as stored:
             for dtype, count in self._parts:
-                yield np.frombuffer(file.read(dtype.itemsize * count), dtype)
+                file.write(np.frombuffer(stored.read(dtype.itemsize * count), dtype).astype(final).tobytes())
 
 
 def _array(values: Sequence[Any]) -> NDArray[Any]:

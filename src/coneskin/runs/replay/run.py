@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import islice
 from pathlib import Path
@@ -67,7 +67,6 @@ class Replay:
         duration: of the recording [s].
         missing: what the recording lacks, in a sentence.
         other_code: in what today's code differs from what recorded the run, as of ``Run.other_code``.
-        verdict: of all that.
     """
 
     events: list[GuardEvent]
@@ -78,22 +77,17 @@ class Replay:
     duration: float
     missing: str
     other_code: tuple[str, ...] = ()
-    verdict: Verdict = field(init=False)
 
-    def __post_init__(self) -> None:
+    @property
+    def verdict(self) -> Verdict:
+        """What all that shows."""
         whole = not self.missing and self.compared
-        verdict = Verdict.DIFFERENT if self.differences else Verdict.SAME if whole else Verdict.INCOMPLETE
-        object.__setattr__(self, "verdict", verdict)
+        return Verdict.DIFFERENT if self.differences else Verdict.SAME if whole else Verdict.INCOMPLETE
 
     @property
     def same(self) -> bool:
         """True where the whole run is there, has events, and each of them is the same, bit by bit."""
         return self.verdict is Verdict.SAME
-
-    @property
-    def agrees(self) -> bool:
-        """True where nothing differs as far as it can be compared; a run of which all is missing agrees, too."""
-        return not self.differences
 
 
 _PROGRESS_PERIOD = 1.0  # s of a run between two calls

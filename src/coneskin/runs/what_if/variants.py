@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
-from coneskin.core.text import finite
 from coneskin.runs.export.tables import write_parquet
 
 if TYPE_CHECKING:
@@ -32,9 +31,9 @@ class VariantScore(NamedTuple):
         missed: of them.
         false_alarms: contacts without a touch, in runs of which someone knows what touched them.
         unlabeled: contacts beyond the recorded ones in other runs, touches or false alarms.
-        delay: median of the runs' median delays [s]; NaN without any. Runs of which nobody knows what touched them
-            count where there are no others.
-        worst_delay: the largest [s].
+        delay_median_ms: median of the runs' median delays; NaN without any. Runs of which nobody knows what touched
+            them count where there are no others.
+        delay_max_ms: the largest.
         hours: of the recordings [h].
     """
 
@@ -46,15 +45,9 @@ class VariantScore(NamedTuple):
     missed: int
     false_alarms: int
     unlabeled: int
-    delay: float
-    worst_delay: float
+    delay_median_ms: float
+    delay_max_ms: float
     hours: float
-
-    def facts(self) -> dict[str, Any]:
-        """Return the score as values for JSON, with units in the names."""
-        facts = self._asdict()
-        delays = {"delay_median_ms": 1e3 * facts.pop("delay"), "delay_max_ms": 1e3 * facts.pop("worst_delay")}
-        return {**facts, **finite(delays)}
 
 
 def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:
@@ -67,21 +60,12 @@ def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:
         known = [row for row in good if row["truth"] != "recorded"] or good
         delays = [row["delay_median_ms"] for row in known if row["delay_median_ms"] is not None]
         worst = [row["delay_max_ms"] for row in known if row["delay_max_ms"] is not None]
-        scores.append(
-            VariantScore(
-                variant,
-                len(good),
-                len(mine) - len(good),
-                sum(not row["same"] for row in good),
-                sum(row["touches"] for row in good),
-                sum(row["missed"] for row in good),
-                sum(row["false_alarms"] for row in good),
-                sum(row["unlabeled"] for row in good),
-                1e-3 * statistics.median(delays) if delays else math.nan,
-                1e-3 * max(worst) if worst else math.nan,
-                sum(row["duration_s"] for row in good) / 3600.0,
-            )
-        )
+        changed = sum(not row["same"] for row in good)
+        sums = [sum(row[name] for row in good) for name in ("touches", "missed", "false_alarms", "unlabeled")]
+        median = statistics.median(delays) if delays else math.nan
+        hours = sum(row["duration_s"] for row in good) / 3600.0
+        facts = (variant, len(good), len(mine) - len(good), changed, *sums, median, max(worst, default=math.nan), hours)
+        scores.append(VariantScore._make(facts))
     return scores
 
 
@@ -96,7 +80,7 @@ def variant_lines(scores: Sequence[VariantScore]) -> list[str]:
     for name, s in zip(names, scores, strict=True):
         lines.append(
             f"{name:{width}}  {s.runs:4}  {s.broken:6}  {s.changed:7}  {s.touches:7}  {s.missed:6}  "
-            f"{s.false_alarms:12}  {s.unlabeled:9}  {_ms(s.delay):>14}  {_ms(s.worst_delay):>7}"
+            f"{s.false_alarms:12}  {s.unlabeled:9}  {_ms(s.delay_median_ms):>14}  {_ms(s.delay_max_ms):>7}"
         )
     return lines
 
@@ -115,8 +99,8 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     write_parquet(path, [{name: [row.get(name) for row in rows] for name in names}])
 
 
-def _ms(seconds: float) -> str:
-    return "-" if math.isnan(seconds) else f"{1e3 * seconds:.1f} ms"
+def _ms(delay: float) -> str:
+    return "-" if math.isnan(delay) else f"{delay:.1f} ms"
 
 
 _LINE_HEIGHT = 0.19  # inch of a line of the key
@@ -138,19 +122,19 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
     from matplotlib.lines import Line2D
 
     shared, names = _shared_settings([score.variant for score in scores])
-    drawn = [score for score in scores if not math.isnan(score.delay)]
+    drawn = [score for score in scores if not math.isnan(score.delay_median_ms)]
     differ = len({_place(score) for score in drawn}) > 1  # one dot alone would say less than its numbers
     figure = Figure(figsize=(8.0, (4.6 if differ else 0.6) + _LINE_HEIGHT * len(scores)), layout="constrained")
     key = []
     for number, (score, name) in enumerate(zip(scores, names, strict=True), 1):
-        seen = not math.isnan(score.delay)
+        seen = not math.isnan(score.delay_median_ms)
         colour, marker = _look(score)
         said = (
             f"{score.missed} of {score.touches} touches missed" if score.missed else f"all {score.touches} touches seen"
         )
         words = f"{number}: {name}: {said}, {score.false_alarms} false alarm{'s'[: score.false_alarms != 1]}"
         words += f", {score.unlabeled} unlabeled" if score.unlabeled else ""
-        words += f", delay {1e3 * score.delay:.1f} ms" if seen else "; not drawn, for it has no delay"
+        words += f", delay {score.delay_median_ms:.1f} ms" if seen else "; not drawn, for it has no delay"
         if score.runs == 0:
             words, colour, marker = f"{number}: {name}: no run could be judged with it", "0.5", "x"
         key.append(Line2D([], [], color=colour, marker=marker, ls="", label=words))
@@ -177,7 +161,7 @@ def _duration_words(hours: float) -> str:
 
 def _place(score: VariantScore) -> tuple[float, float]:
     """Return where a variant is drawn: false alarms and unlabeled contacts, delay [ms]."""
-    return score.false_alarms + score.unlabeled, 1e3 * score.delay
+    return score.false_alarms + score.unlabeled, score.delay_median_ms
 
 
 def _look(score: VariantScore) -> tuple[str, str]:
@@ -187,7 +171,7 @@ def _look(score: VariantScore) -> tuple[str, str]:
 def _draw_places(axes: Any, scores: Sequence[VariantScore], time: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    places = {number: _place(score) for number, score in enumerate(scores, 1) if not math.isnan(score.delay)}
+    places = {number: _place(score) for number, score in enumerate(scores, 1) if not math.isnan(score.delay_median_ms)}
     axes.plot(*zip(*places.values(), strict=True), color="0.7", lw=1.0, zorder=1)
     for number, at in places.items():
         colour, marker = _look(scores[number - 1])

@@ -56,17 +56,8 @@ class _TouchLabel(NamedTuple):
     early: float = 0.0
 
 
-def _label_path(recording: Path) -> Path:
-    """Return the file of a recording's labels: ``run.touches.toml`` of ``run.rec``."""
-    return recording.with_suffix(".touches.toml")
-
-
 def _read_labels(path: Path) -> list[_TouchLabel]:
-    """Return the touches in a TOML file: tables ``[[touch]]`` with ``start_s``, ``end_s`` and, if wanted, ``sensor``.
-
-    Raises:
-        RecordingError: the file cannot be read, or a touch has no beginning before its end.
-    """
+    """Return the touches in a TOML file: ``[[touch]]`` with ``start_s``, ``end_s`` and, if wanted, ``sensor``."""
     try:
         tables = tomllib.loads(read_file(path, _MAX_SIZE).decode("utf-8-sig")).get("touch", [])
         labels = [_TouchLabel(item["start_s"], item["end_s"], str(item.get("sensor", ""))) for item in tables]
@@ -81,11 +72,7 @@ def _read_labels(path: Path) -> list[_TouchLabel]:
 
 
 def _true_touches(run: Run) -> list[_TouchLabel] | None:
-    """Return with what the virtual skin of a run was touched, by a script or by bodies; None where nothing tells.
-
-    Raises:
-        RecordingError: what the recording tells is damaged.
-    """
+    """Return with what the virtual skin of a run was touched, by a script or by bodies; None where nothing tells."""
     told = [block for block in run.select(kinds=_TRUTH_KINDS) if contact_force(block.payload) is None]
     if not told:
         return None
@@ -231,7 +218,7 @@ def _broken_rows(path: Path, variants: _Variants, why: str) -> Rows:
 
 def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel], str]:
     """Return the touches that there were in the time of a run, and who says so."""
-    labels = _label_path(path)
+    labels = path.with_suffix(".touches.toml")
     if labels.is_file():
         return _read_labels(labels), "labels"
     touches = _true_touches(run)
