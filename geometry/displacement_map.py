@@ -8,7 +8,6 @@ while the arm moves. A sheet spans holes and narrow grooves, so the grid does to
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,7 +66,7 @@ class DisplacementMap:
 
     placed: PlacedFrustum
     heights: Floats
-    _point: Callable[[float, float], Vector] = field(init=False, repr=False)
+    _rows: list[list[float]] = field(init=False, repr=False)  # plain floats, for the live loop
 
     def __post_init__(self) -> None:
         heights = frozen(self.heights, (None, None), "heights")
@@ -76,73 +75,28 @@ class DisplacementMap:
         if self.placed.frustum.wrap == math.tau and not np.array_equal(heights[:, 0], heights[:, -1]):
             raise GeometryError("heights of a full wrap must end with the column they begin with")
         object.__setattr__(self, "heights", heights)
-        compiled = _compiled if type(self.placed) is PlacedFrustum else _bent
-        object.__setattr__(self, "_point", compiled(self.placed, heights.tolist()))
+        object.__setattr__(self, "_rows", heights.tolist())
 
     def point(self, u: float, phi: float) -> Vector:
         """Return the point of the mesh at (u [m], phi [rad]), in the link's frame [m].
 
         Beyond the ends and the edges of the sheet the cone continues with the height at the rim.
         """
-        return self._point(u, phi)
+        (x, y, z), (nx, ny, nz), height = self.placed.point(u, phi), self.placed.normal(phi), self._height(u, phi)
+        return x + height * nx, y + height * ny, z + height * nz
 
-
-def _heights(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], float]:
-    """Return the height [m] at (u, phi) by plain floats."""
-    f = placed.frustum
-    last_row, last_column = len(heights) - 2, len(heights[0]) - 2
-    per_u, per_phi = (last_row + 1) / f.slant, (last_column + 1) / f.wrap
-    full = f.wrap == math.tau
-
-    def height(u: float, phi: float) -> float:
-        y = phi * per_phi
-        if full:
+    def _height(self, u: float, phi: float) -> float:
+        f, rows = self.placed.frustum, self._rows
+        last_row, last_column = len(rows) - 2, len(rows[0]) - 2
+        x, y = u * (last_row + 1) / f.slant, phi * (last_column + 1) / f.wrap
+        if f.wrap == math.tau:
             y %= last_column + 1
-        x = u * per_u
-        i, j = int(x), int(y)
-        if not 0.0 <= x <= last_row:
-            i = 0 if x < 0.0 else last_row
-            x = min(max(x, 0.0), last_row + 1)
-        if not 0.0 <= y <= last_column:
-            j = 0 if y < 0.0 else last_column
-            y = min(max(y, 0.0), last_column + 1)
-        x -= i
-        y -= j
-        near, far = heights[i], heights[i + 1]
+        i, j = min(max(int(x), 0), last_row), min(max(int(y), 0), last_column)
+        x, y = min(max(x, 0.0), last_row + 1) - i, min(max(y, 0.0), last_column + 1) - j
+        near, far = rows[i], rows[i + 1]
         a, b = near[j], far[j]
         a += (near[j + 1] - a) * y
         return a + (b + (far[j + 1] - b) * y - a) * x
-
-    return height
-
-
-def _bent(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
-    """Return ``point`` of a side that is no cone."""
-    height_at = _heights(placed, heights)
-
-    def point(u: float, phi: float) -> Vector:
-        (x, y, z), (nx, ny, nz), height = placed.point(u, phi), placed.normal(phi), height_at(u, phi)
-        return x + height * nx, y + height * ny, z + height * nz
-
-    return point
-
-
-def _compiled(placed: PlacedFrustum, heights: list[list[float]]) -> Callable[[float, float], Vector]:
-    """Return ``point`` of a cone with every constant bound: plain floats, no attribute looked up."""
-    f, pose = placed.frustum, placed.link_frustum
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = pose.rotation
-    ox, oy, oz = pose.translation
-    radius, sa, ca = f.radius1, f.sin_half_angle, f.cos_half_angle
-    height_at = _heights(placed, heights)
-    cos, sin = math.cos, math.sin
-
-    def point(u: float, phi: float) -> Vector:
-        height = height_at(u, phi)
-        rho = radius + u * sa + height * ca
-        px, py, pz = rho * cos(phi), rho * sin(phi), u * ca - height * sa
-        return xx * px + xy * py + xz * pz + ox, yx * px + yy * py + yz * pz + oy, zx * px + zy * py + zz * pz + oz
-
-    return point
 
 
 def measure_displacement(

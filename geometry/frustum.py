@@ -119,8 +119,9 @@ class Frustum:
             continuation of the side, so u may lie outside [0, slant]; phi lies within half a turn of wrap / 2.
         """
         sa, ca = self.sin_half_angle, self.cos_half_angle
-        out = math.hypot(x, y) - self.radius1
-        return out * sa + z * ca, self._branch(math.atan2(y, x), self.wrap), out * ca - z * sa
+        out, angle = math.hypot(x, y) - self.radius1, math.atan2(y, x)
+        phi = angle - math.tau * round((angle - 0.5 * self.wrap) / math.tau)
+        return out * sa + z * ca, phi, out * ca - z * sa
 
     def polar(self, u: float, phi: float) -> tuple[float, float]:
         """Return the polar coordinates (r [m], theta [rad]) on the flat sector; (infinity, 0) on a cylinder."""
@@ -141,11 +142,6 @@ class Frustum:
         rho = self.radius_at(u)
         half = 0.5 * phi * sa
         return rho * phi * sinc(phi * sa), u - rho * phi * math.sin(half) * sinc(half)
-
-    @staticmethod
-    def _branch(angle: float, span: float) -> float:
-        """Return the angle [rad], moved by whole turns, that lies within half a turn of span / 2."""
-        return angle - math.tau * round((angle - 0.5 * span) / math.tau)
 
     def points(self, u: ArrayLike, phi: ArrayLike) -> Floats:
         """Return the points of the side for arrays u [m] and phi [rad] that broadcast: shape (..., 3) [m]."""

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -79,11 +81,20 @@ MAX_SIZE = 100_000_000  # bytes of a file; 2 million triangles, and a link is mo
 MIN_LENGTH = 0.005  # m; a shorter mesh is in another unit
 MAX_LENGTH = 5.0  # m; a longer mesh is in another unit
 MIN_THICKNESS = 0.0005  # m; a thinner mesh is a flat drawing
-#: note on a mesh of a model; {0} is the model
-TERMS = "{0}: the maker's terms for its drawings forbid physical models of {0} for commercial use"
+_RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+def terms_of(name: str) -> tuple[str, ...]:
+    """Return a note on the terms of use, if a file or a link has the name of a model whose maker restricts them."""
+    if not _RESTRICTED_MODELS.search(name):
+        return ()
+    return (
+        "this looks like a mesh of a UR20 or UR30: Universal Robots' terms for these forbid physical models for "
+        "commercial purposes",
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of one link, in the frame of the link.
 
@@ -100,7 +111,6 @@ class Mesh:
     source: str = "mesh"
     unit: str = "m"
     notes: tuple[str, ...] = ()
-    _kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)  # what takes long of a large mesh
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))
@@ -113,25 +123,20 @@ class Mesh:
         """Corners of every face [m], shape (m, 3, 3)."""
         return self.vertices[self.faces]
 
+    @cached_property
     def normals_and_areas(self) -> tuple[Floats, Floats]:
-        """Return the unit normals by the winding of the file, shape (m, 3), and the areas [m2], shape (m,)."""
-        if "normals" not in self._kept:
-            cross = _edge_products(self.vertices, self.faces)
-            twice = np.sqrt((cross * cross).sum(axis=0))
-            kept = (cross / twice).T, 0.5 * twice
-            for array in kept:
-                array.setflags(write=False)
-            self._kept["normals"] = kept
-        normals, areas = self._kept["normals"]
+        """Unit normals by the winding of the file, shape (m, 3), and the areas [m2], shape (m,)."""
+        cross = _edge_products(self.vertices, self.faces)
+        twice = np.sqrt((cross * cross).sum(axis=0))
+        normals, areas = (cross / twice).T, 0.5 * twice
+        for array in (normals, areas):
+            array.setflags(write=False)
         return normals, areas
 
-    @property
+    @cached_property
     def outermost(self) -> Floats:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
-        if "outermost" not in self._kept:
-            self._kept["outermost"] = frozen(_outermost_points(self.vertices), (None, 3), "outermost")
-        outermost: Floats = self._kept["outermost"]
-        return outermost
+        return frozen(_outermost_points(self.vertices), (None, 3), "outermost")
 
     @property
     def size(self) -> Floats:
@@ -147,21 +152,20 @@ class Mesh:
         used, faces = _numbered_anew(self.faces[chosen], len(self.vertices))
         return Mesh(self.vertices[used], faces, self.source, self.unit, self.notes)
 
+    @cached_property
     def embree_intersector(self) -> Callable[[Floats, Floats], Ints] | None:
-        """Return a function that casts rays with embree, through trimesh; None without the package embreex.
+        """A function that casts rays with embree, through trimesh; None without the package embreex.
 
         The function takes origins [m] and directions, both of shape (n, 3), and returns the index of the first face hit
         by each ray, -1 for none, shape (n,).
         """
-        if "embree" not in self._kept:
-            try:
-                import trimesh
-                from trimesh.ray.ray_pyembree import RayMeshIntersector
-            except ImportError:
-                return None
-            body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
-            self._kept["embree"] = RayMeshIntersector(body).intersects_first
-        first: Callable[[Floats, Floats], Ints] = self._kept["embree"]
+        try:
+            import trimesh
+            from trimesh.ray.ray_pyembree import RayMeshIntersector
+        except ImportError:
+            return None
+        body = trimesh.Trimesh(self.vertices, self.faces, process=False, validate=False)
+        first: Callable[[Floats, Floats], Ints] = RayMeshIntersector(body).intersects_first
         return first
 
 
@@ -191,7 +195,7 @@ def load_mesh(path: str | Path, unit: str | None = None, scale: tuple[float, flo
         raise MeshError(f"{path}: a mesh is read from {', '.join(SUFFIXES)}, got {path.suffix or 'no suffix'}")
     if not data:
         raise MeshError(f"{path}: the file is empty")
-    notes = [TERMS.format(part.upper()) for part in path.resolve().parts if part.lower() in ("ur20", "ur30")]
+    notes = list(terms_of(str(path.resolve())))
     metres = None if unit is None else UNITS[unit]
     asset = None
     if path.suffix.lower() == ".dae":

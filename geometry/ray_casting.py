@@ -20,10 +20,10 @@ class RayCaster:
     """
 
     def __init__(self, mesh: Mesh, engine: str | None = None) -> None:
-        found = mesh.embree_intersector() if engine in (None, "embree") else None
+        found = mesh.embree_intersector if engine in (None, "embree") else None
         self.engine = "embree" if found else "grid"
         self._first_faces = found or _GridRayCaster(mesh).first_faces
-        normals = mesh.normals_and_areas()[0]
+        normals = mesh.normals_and_areas[0]
         # a coordinate at a time: numpy is slow with arrays of three columns
         self._normals = tuple(np.ascontiguousarray(column) for column in normals.T)
         self._heights = np.einsum("ij,ij->i", mesh.vertices[mesh.faces[:, 0]], normals)

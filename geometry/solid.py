@@ -111,7 +111,7 @@ def require_step_writer() -> None:
     try:
         import OCP  # noqa: F401
     except ImportError as exc:
-        raise _missing() from exc
+        raise MissingExtra("cadquery-ocp-novtk", "writing a STEP file", "cad") from exc
 
 
 def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
@@ -127,20 +127,19 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
         GeometryError: the kernel refuses a shape, or the file cannot be written.
         MissingExtra: cadquery-ocp is not installed.
     """
-    try:
-        from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
-        from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
-        from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf
-        from OCP.IFSelect import IFSelect_ReturnStatus
-        from OCP.Message import Message
-        from OCP.STEPCAFControl import STEPCAFControl_Writer
-        from OCP.TCollection import TCollection_ExtendedString
-        from OCP.TDataStd import TDataStd_Name
-        from OCP.TDocStd import TDocStd_Document
-        from OCP.TopLoc import TopLoc_Location
-        from OCP.XCAFDoc import XCAFDoc_DocumentTool
-    except ImportError as exc:
-        raise _missing() from exc
+    require_step_writer()
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakePolygon
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
+    from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.Message import Message
+    from OCP.STEPCAFControl import STEPCAFControl_Writer
+    from OCP.TCollection import TCollection_ExtendedString
+    from OCP.TDataStd import TDataStd_Name
+    from OCP.TDocStd import TDocStd_Document
+    from OCP.TopLoc import TopLoc_Location
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+
     Message.DefaultMessenger_s().ChangePrinters().Clear()  # it would write to standard output
     document = TDocStd_Document(TCollection_ExtendedString("coneskin"))
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
@@ -163,10 +162,6 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
     writer.Transfer(document)
     if writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
         raise GeometryError(f"{path}: the CAD kernel cannot write it")
-
-
-def _missing() -> MissingExtra:
-    return MissingExtra("cadquery-ocp-novtk", "writing a STEP file", "cad")
 
 
 def _section(inner: Frustum, thickness: float) -> list[tuple[float, float]]:

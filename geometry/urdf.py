@@ -102,11 +102,7 @@ def urdf_joints(
         if parent is None or child is None or kind not in ("revolute", "continuous", "fixed"):
             continue
         name = f"{path}: joint {joint.get('name')}"
-        origin, axis, limit = (joint.find(tag) for tag in ("origin", "axis", "limit"))
-        xyz, rpy = (
-            _numbers("0 0 0" if origin is None else origin.get(key, "0 0 0"), f"{name}: {key}")
-            for key in ("xyz", "rpy")
-        )
+        axis, limit = joint.find("axis"), joint.find("limit")
         way = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"{name}: axis")
         lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
         if kind == "revolute" and limit is not None:
@@ -116,7 +112,7 @@ def urdf_joints(
         length = math.hypot(*way) or 1.0
         unit = way[0] / length, way[1] / length, way[2] / length
         links = parent.get("link", ""), child.get("link", "")
-        joints.append(UrdfJoint(*links, Pose.from_xyz_rpy(xyz, rpy), unit, lower, upper))
+        joints.append(UrdfJoint(*links, _origin(joint, f"joint {joint.get('name')}", path), unit, lower, upper))
     return tuple(joints)
 
 
@@ -163,10 +159,7 @@ def load_urdf_link(
         scale = _numbers(shape.get("scale", "1 1 1"), f"{path}: scale of {link}")
         # lengths of a URDF are in metres; only COLLADA has a unit tag of its own
         unit = None if file.suffix.lower() == ".dae" else "m"
-        origin = body.find("origin")
-        xyz = _numbers("0 0 0" if origin is None else origin.get("xyz", "0 0 0"), f"{path}: xyz of {link}")
-        rpy = _numbers("0 0 0" if origin is None else origin.get("rpy", "0 0 0"), f"{path}: rpy of {link}")
-        parts.append(load_mesh(file, unit, scale).moved(Pose.from_xyz_rpy(xyz, rpy)))
+        parts.append(load_mesh(file, unit, scale).moved(_origin(body, link, path)))
     source = f"{path}: {link}"
     if not parts:
         other = "collision" if geometry == "visual" else "visual"
@@ -222,6 +215,15 @@ def _resolve(name: str, urdf: Path, packages: Mapping[str, str | Path]) -> Path:
     if parsed.scheme and len(parsed.scheme) > 1:
         raise MeshError(f"{name}: a mesh is named by package://, file:// or a path, got {parsed.scheme}://")
     return (urdf.parent / name).resolve()
+
+
+def _origin(owner: ElementTree.Element, name: str, path: str | Path) -> Pose:
+    """Return the pose that the origin tag of a joint or a body gives."""
+    origin = owner.find("origin")
+    values = {} if origin is None else origin.attrib
+    return Pose.from_xyz_rpy(
+        *(_numbers(values.get(key, "0 0 0"), f"{path}: {key} of {name}") for key in ("xyz", "rpy"))
+    )
 
 
 def _numbers(text: str, name: str) -> Vector:

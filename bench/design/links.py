@@ -33,7 +33,7 @@ import numpy as np
 from bench.report import head
 from coneskin.core.errors import MeshError
 from coneskin.geometry.fit import candidates as hypotheses
-from coneskin.geometry.fit.axis_plan import SheetRequirements, plan_sheets
+from coneskin.geometry.fit.axis_plan import SheetRequirements
 from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, _find_revolution_axis
 from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
@@ -126,17 +126,16 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     )
     axes = brute_axes(hull)
     link = SampledLink(mesh, rays, hull, hull, None, axes)
-    stage = FineStage(link, wanted)
     surveys = survey_axes(link, wanted)
-    loose = replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
-    alone = [plan_sheets(one.profile, one.lines, loose, sheets) for one in surveys]
+    stage = FineStage(link, surveys, wanted)
+    loose, alone = stage.loose, stage.alone
     singles = [Choice(number, one) for number, plans in enumerate(alone) for one in plans]
     singles.sort(key=lambda choice: -choice.plan.score(loose))
     packings = [grown([start], surveys, alone, loose) for start in starts_apart(singles)]
     packings.sort(key=lambda packing: -sum(choice.plan.score(loose) for choice in packing))
     best = 0.0
     for packing in packings[:FINE_PACKINGS]:
-        made = stage.completed(stage.made(packing), surveys)
+        made = stage.completed(stage.made(packing))
         if made is not None:
             fitted = [fitted_sheet(about, side, 0, hull, FIT_TOLERANCE) for about in made.axes for side in about.sides]
             best = max(best, sum(sheet.frustum.area for sheet in fitted))

@@ -25,7 +25,7 @@ from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline, PathSegment, joint_bounds
 from .part_labels import PartLabel, part_labels, strip_label
 from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
-from .touch_marks import CoverMarks
+from .touch_marks import CoverMarks, marks_on_link
 
 
 def _layout_above(layout: SheetLayout, place: PlacedFrustum, height: float) -> SheetLayout:
@@ -217,7 +217,10 @@ def cut_sheets(
             pair = "CD" if index < 2 else "AB"
             parts = tuple(_foil(layout, surface, which, face, plain) for which in pair)
         else:
-            crosses = CoverMarks.of(flat, layout, surface, stack, place) if index == 4 else None
+            crosses = None
+            if index == 4:
+                above = [(u, place.azimuth_above(stack.offset(4), phi)) for u, phi in marks_on_link(flat, stack, place)]
+                crosses = CoverMarks(layout, surface, above)
             strokes = _marks(layout, surface, index, crosses, stack.assembly != "loose") + _border(
                 layout, surface, index, overlap if index == 4 else 0.0
             )

@@ -47,7 +47,7 @@ class PartLabel:
     @property
     def width(self) -> float:
         """Length of the line in Helvetica [m]."""
-        return _text_width(self.text, self.height)
+        return sum(_EM_WIDTHS[ord(letter) - 32] for letter in self.text) * self.height / CAP_HEIGHT
 
     def mirrored(self) -> PartLabel:
         """Return the label at its place on the mirrored part, itself not mirrored."""
@@ -59,11 +59,6 @@ class PartLabel:
         for a in (-0.5 * self.width, 0.5 * self.width):
             for b in (-0.5 * self.height, 0.5 * self.height):
                 yield self.x + a * c - b * s, self.y + a * s + b * c
-
-
-def _text_width(text: str, height: float) -> float:
-    """Return the length of a line of ASCII text in Helvetica, in the unit of the height of its capitals."""
-    return sum(_EM_WIDTHS[ord(letter) - 32] for letter in text) * height / CAP_HEIGHT
 
 
 def part_labels(

@@ -97,11 +97,6 @@ class _PageTiling:
     cells: tuple[tuple[int, int], ...]
 
     @property
-    def corner(self) -> tuple[float, float]:
-        """Lower left corner of the window on its page."""
-        return _SIDE_MARGIN, _BOTTOM_MARGIN
-
-    @property
     def window(self) -> tuple[float, float]:
         """Width and height of a window."""
         return self.width - 2.0 * _SIDE_MARGIN, self.height - _TOP_MARGIN - _BOTTOM_MARGIN
@@ -244,7 +239,7 @@ def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
     width, height = tiling.window
     count = len(tiling.cells)
     for page, (column, row) in enumerate(tiling.cells, start=1):
-        left, bottom = tiling.corner
+        left, bottom = _SIDE_MARGIN, _BOTTOM_MARGIN
         x, y = tiling.origin[0] + column * width, tiling.origin[1] + row * height
         bleed = _BLEED_WIDTH
         clip = " ".join(map(_pdf_number, (left - bleed, bottom - bleed, width + 2 * bleed, height + 2 * bleed)))
@@ -288,7 +283,7 @@ def _registration(x: float, y: float) -> Iterator[str]:
 
 def _map_page(tiling: _PageTiling, sheets: Sequence[CutSheet], title: str) -> list[str]:
     """Return the overview page: a map of the pages, the materials, and how to print."""
-    left, bottom = tiling.corner
+    left, bottom = _SIDE_MARGIN, _BOTTOM_MARGIN
     width, height = tiling.window
     content = ["0 0 0 rg 0 0 0 RG", _text(title, left, bottom + height - 6.0, 5.0)]
     pages = "One page follows" if len(tiling.cells) == 1 else f"{len(tiling.cells)} pages follow"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -17,20 +16,11 @@ from .surface_shape import ShapeCorner, SurfaceShape, drawing_point
 _FIRST_SHARE, _LAST_SHARE = 0.1, 0.9  # of the slant and of the wrap; beyond, a touch is cut off by the rim
 _MARKS_PER_SIDE = 3  # marks along and around
 _READ_LAYER = 3  # the upper conductive one, on which touches are located
-_COVER_LAYER = 4  # the one that is drawn on
 _ARM_LENGTH = 2e-3  # m; half of a line of the cross
 _NUMBER_HEIGHT = 2e-3  # m; height of a mark's number
 
 
-class _TouchMark(NamedTuple):
-    """A mark, by its place between the inner edges of the electrodes; a sensor's places are measured from there."""
-
-    number: int
-    u: float  #: slant distance from end 1 [m]
-    phi: float  #: azimuth from electrode D, on the upper conductive layer [rad]
-
-
-def mark_parts(side: int) -> Iterator[tuple[float, float]]:
+def mark_parts(side: int = _MARKS_PER_SIDE) -> Iterator[tuple[float, float]]:
     """Yield the places of a grid as parts along and around, row by row from end 1, each from the end of the one before.
 
     Args:
@@ -40,18 +30,6 @@ def mark_parts(side: int) -> Iterator[tuple[float, float]]:
     for row, along in enumerate(parts):
         for around in parts if row % 2 == 0 else reversed(parts):
             yield along, around
-
-
-def touch_marks(active: Frustum) -> tuple[_TouchMark, ...]:
-    """Return the marks that are drawn on the cover of a sheet.
-
-    Args:
-        active: cone between the inner edges of the electrodes, on the upper conductive layer.
-    """
-    return tuple(
-        _TouchMark(number, along * active.slant, around * active.wrap)
-        for number, (along, around) in enumerate(mark_parts(_MARKS_PER_SIDE), 1)
-    )
 
 
 def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) -> tuple[tuple[float, float], ...]:
@@ -70,7 +48,7 @@ def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) 
             field.u1 + along * (field.u2 - field.u1),
             read.azimuth_above(-height, first + around * (last - first)),
         )
-        for along, around in mark_parts(_MARKS_PER_SIDE)
+        for along, around in mark_parts()
     )
 
 
@@ -89,24 +67,7 @@ class CoverMarks:
 
     layout: SheetLayout
     surface: Frustum
-    places: tuple[tuple[float, float], ...]
-
-    @classmethod
-    def of(
-        cls, flat: SheetLayout, cover: SheetLayout, surface: Frustum, stack: LayerStack, place: PlacedFrustum
-    ) -> Self:
-        """Return the marks of a sheet.
-
-        Args:
-            flat: layout of the sheet on its link.
-            cover: the same on the cover.
-            surface: the cone for which the cover is cut.
-            stack: the layers.
-            place: side of the link under the sheet.
-        """
-        top = stack.offset(_COVER_LAYER)
-        places = ((u, place.azimuth_above(top, phi)) for u, phi in marks_on_link(flat, stack, place))
-        return cls(cover, surface, tuple(places))
+    places: Sequence[tuple[float, float]]
 
     @property
     def clear(self) -> SurfaceRectangle:

@@ -11,8 +11,9 @@ sheets about them. A sampled link is what every search sees: its rays, samples o
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -115,17 +116,26 @@ def _cone_hypotheses(
         return []
     voters = rng.permutation(len(samples))[:_VOTER_COUNT]
     explained = _explains(samples.points[voters], samples.normals[voters], origins, axes, radii, angles, distance)
-    votes = explained.astype(np.float32)
-    left = np.ones(len(voters), np.float32)
-    starts: list[InfiniteCone] = []
-    while len(starts) < max_count:
+    best = itertools.islice(most_voted(explained.astype(np.float32), _LEAST_SHARE), max_count)
+    return [InfiniteCone(origins[k], axes[k], float(radii[k]), float(angles[k])) for k in best]
+
+
+def most_voted(votes: Floats, share: float, kept: float = 0.0) -> Iterator[int]:
+    """Yield the columns that most rows vote for, each counting rows less that have voted for one before.
+
+    Args:
+        votes: 1 for each row and each column for which it votes, else 0, shape (rows, columns).
+        share: of the rows, below which no column is yielded.
+        kept: what is left of the weight of a row that has voted for a column.
+    """
+    left = np.ones(len(votes), votes.dtype)
+    while True:
         score = left @ votes
         best = int(score.argmax())
-        if score[best] < _LEAST_SHARE * len(voters):
-            break
-        starts.append(InfiniteCone(origins[best], axes[best], float(radii[best]), float(angles[best])))
-        left[explained[:, best]] = 0.0
-    return starts
+        if score[best] < share * len(votes):
+            return
+        left[votes[:, best] > 0.0] *= kept
+        yield best
 
 
 def _partners(samples: SurfaceSamples, rng: np.random.Generator, count: int, others: int) -> list[Ints]:

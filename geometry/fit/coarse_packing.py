@@ -124,7 +124,7 @@ class Choice:
 
 
 def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[AxisSurvey]:
-    """Measure a coarse profile about every axis; ``best_plan`` packs sheets on them for any tolerance."""
+    """Measure a coarse profile about every axis; ``FineStage`` packs sheets on them for any tolerance."""
     surveys = []
     for candidate in link.axes:
         frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,10 @@ from coneskin.geometry.mesh import Mesh
 from .axis_plan import AxisPlan, SheetRequirements
 from .bare_areas import BareArea, bare_areas, hull_note
 from .candidates import SampledLink, sample_link
-from .coarse_packing import AxisSurvey, better_surveys, survey_axes
+from .coarse_packing import better_surveys, survey_axes
 from .fit_options import MOST_TOLERANCE, FitOptions, check_names
 from .fitted_sheet import FittedSheet, fitted_sheet
-from .plan import FineStage, SheetPlan, best_plan
+from .plan import FineStage, SheetPlan
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights
 
@@ -113,9 +113,9 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     say("measuring profiles")
     surveys = survey_axes(link, requirements)
     surveys += better_surveys(link, surveys, requirements)
-    search = _Search(link, surveys, requirements, options.allow_hull)
+    stage = FineStage(link, surveys, requirements)
     tolerance, worth = options.tolerance, link.worth
-    plan, refusal = search.plan(tolerance)
+    plan, refusal = _plan(stage, options.allow_hull)
     fit = LinkFit(
         sheets=(),
         nearest=None,
@@ -134,7 +134,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         if length < least:
             reason = f"the link is {length * 1e3:.1f} mm long, but a sheet needs at least {least * 1e3:g} mm"
         say("looking for the nearest sheet")
-        looser, needed = search.nearest()
+        looser, needed = _nearest(stage, options.allow_hull)
         nearest = None
         if looser is not None:
             first = looser.axes[0]
@@ -144,7 +144,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     first = plan.axes[0]
     further: AxisPlan | None = None
     if plan.count >= requirements.max_sheets:
-        further = search.stage(tolerance).further(plan.axes, surveys)
+        further = stage.further(plan.axes)
     return replace(
         fit,
         sheets=tuple(
@@ -157,47 +157,32 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Search:
-    """What is known of a link when sheets are looked for, with one tolerance or another."""
-
-    link: SampledLink
-    surveys: list[AxisSurvey]
-    requirements: SheetRequirements
-    allow_hull: bool
-    _stages: dict[float, FineStage] = field(default_factory=dict, repr=False)
-
-    def stage(self, tolerance: float) -> FineStage:
-        """Return where packings are made anew within a tolerance [m]."""
-        if tolerance not in self._stages:
-            wanted = replace(self.requirements, tolerance=tolerance)
-            self._stages[tolerance] = FineStage(self.link, wanted)
-        return self._stages[tolerance]
-
-    def plan(self, tolerance: float) -> tuple[SheetPlan | None, str]:
-        """Return the best plan within a tolerance [m]; or None and, for a mesh that is a bare hull, the reason."""
-        stage = self.stage(tolerance)
-        plan, wanted = best_plan(stage, self.surveys), stage.requirements
-        area, whole = plan.area if plan else 0.0, self.link.weighed_area
-        # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
-        if self.allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):
-            return plan, ""
-        hulled = hull_note(self.link.mesh, self.link.hull)
-        if hulled:
-            share = f"{100.0 * area / whole:.0f} %"
-            return None, f"{hulled} (a sheet within {tolerance * 1e3:g} mm would cover {share} of it)"
+def _plan(stage: FineStage, allow_hull: bool) -> tuple[SheetPlan | None, str]:
+    """Return the best plan; or None and, for a mesh that is a bare hull, the reason."""
+    plan, wanted = stage.best_plan(), stage.requirements
+    area, whole = plan.area if plan else 0.0, stage.link.weighed_area
+    # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
+    if allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):
         return plan, ""
+    hulled = hull_note(stage.link.mesh, stage.link.hull)
+    if hulled:
+        share = f"{100.0 * area / whole:.0f} %"
+        return None, f"{hulled} (a sheet within {wanted.tolerance * 1e3:g} mm would cover {share} of it)"
+    return plan, ""
 
-    def nearest(self) -> tuple[SheetPlan | None, float]:
-        """Return a plan within the least of some tolerances that gives one, and that tolerance [m]."""
-        for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0):
-            tolerance = math.ceil(factor * self.requirements.tolerance / _HINT_STEP - 1e-6) * _HINT_STEP
-            if tolerance > MOST_TOLERANCE:
-                break
-            plan, _ = self.plan(tolerance)
-            if plan is not None:
-                return plan, tolerance
-        return None, math.inf
+
+def _nearest(stage: FineStage, allow_hull: bool) -> tuple[SheetPlan | None, float]:
+    """Return a plan within the least of some tolerances that gives one, and that tolerance [m]."""
+    wanted = stage.requirements
+    for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0):
+        tolerance = math.ceil(factor * wanted.tolerance / _HINT_STEP - 1e-6) * _HINT_STEP
+        if tolerance > MOST_TOLERANCE:
+            break
+        looser = FineStage(stage.link, stage.surveys, replace(wanted, tolerance=tolerance))
+        plan, _ = _plan(looser, allow_hull)
+        if plan is not None:
+            return plan, tolerance
+    return None, math.inf
 
 
 def _longest(hull: SurfaceSamples) -> float:

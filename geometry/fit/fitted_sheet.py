@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from coneskin.core.arrays import Floats
+from coneskin.core.arrays import Bools, Floats
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
@@ -61,6 +61,17 @@ class FittedSheet:
         return self.placed.frustum
 
 
+def deviations(miss: Floats, hole: Bools) -> dict[str, float]:
+    """Return the deviations of a sheet from its distances to cells of the hull [m], and which of these are in holes."""
+    seen = miss[~hole]
+    return {
+        "max_deviation": float(np.abs(seen).max()) if seen.size else math.inf,
+        "rms_deviation": math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
+        "bridged_share": float(hole.mean()),
+        "bridged_depth": float(-miss[hole].min()) if hole.any() else 0.0,
+    }
+
+
 def fitted_sheet(
     plan: AxisPlan,
     side: StraightSide,
@@ -96,14 +107,10 @@ def fitted_sheet(
     radius = profile.radius[side.first : side.end][:, cells]
     hole = profile.bridged[side.first : side.end][:, cells] - radius > tolerance
     miss = (radius - line) * cosine
-    seen = miss[~hole]
     below = side.covers(profile, hull, tolerance)
     return FittedSheet(
         placed=PlacedFrustum(Frustum(max(radii[0], 0.0), max(radii[1], 0.0), end - start, wrap), pose),
-        max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
-        rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
-        bridged_share=float(hole.mean()),
-        bridged_depth=float(-miss[hole].min()) if hole.any() else 0.0,
+        **deviations(miss, hole),
         length_share=(end - start) / (profile.step * len(profile.z)),
         area_share=float(below.mean()),
         facet_rise=side.rise,

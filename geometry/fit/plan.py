@@ -100,41 +100,43 @@ class SheetPlan:
         return sum(plan.score(requirements) for plan in self.axes)
 
 
-def best_plan(stage: FineStage, surveys: list[AxisSurvey]) -> SheetPlan | None:
-    """Return the plan that covers most; None where nothing fits.
-
-    Args:
-        stage: where packings are made on fine profiles.
-        surveys: of the axes, as ``survey_axes`` returns them.
-    """
-    wanted = stage.requirements
-    best: SheetPlan | None = None
-    for packing in packings(surveys, stage.alone(surveys), stage.loose)[:_FINE_PACKINGS]:
-        plan = stage.made(packing)
-        if plan is not None and (best is None or plan.score(wanted) > 1.002 * best.score(wanted)):
-            best = plan
-    return stage.completed(best, surveys)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class FineStage:
     """Where packings are made anew on fine profiles; what is known about an axis without others is kept.
 
     Attributes:
         link: the link.
+        surveys: of its axes, as ``survey_axes`` returns them.
         requirements: on the sheets.
+        alone: coarse plans about each axis by itself, of one sheet, two sheets ... (``plan_sheets``).
     """
 
     link: SampledLink
+    surveys: list[AxisSurvey]
     requirements: SheetRequirements
-    _alone: list[list[AxisPlan]] = field(default_factory=list, repr=False)
+    alone: list[list[AxisPlan]] = field(init=False, repr=False)
     _first: dict[tuple[int, tuple[int, int]], AxisPlan | None] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        most = self.requirements.max_sheets
+        alone = [plan_sheets(one.profile, one.lines, self.loose, most) for one in self.surveys]
+        object.__setattr__(self, "alone", alone)
 
     @property
     def loose(self) -> SheetRequirements:
         """Requirements for coarse profiles, on which a sheet may seem a little worse than it is."""
         wanted = self.requirements
         return replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
+
+    def best_plan(self) -> SheetPlan | None:
+        """Return the plan that covers most; None where nothing fits."""
+        wanted = self.requirements
+        best: SheetPlan | None = None
+        for packing in packings(self.surveys, self.alone, self.loose)[:_FINE_PACKINGS]:
+            plan = self.made(packing)
+            if plan is not None and (best is None or plan.score(wanted) > 1.002 * best.score(wanted)):
+                best = plan
+        return self.completed(best)
 
     def made(self, packing: list[Choice]) -> SheetPlan | None:
         """Return a packing made anew on fine profiles; None where nothing of it is within the tolerance."""
@@ -145,33 +147,33 @@ class FineStage:
                 done.append(plan)
         return SheetPlan(tuple(sorted(done, key=lambda plan: -plan.area))) if done else None
 
-    def completed(self, plan: SheetPlan | None, surveys: list[AxisSurvey]) -> SheetPlan | None:
+    def completed(self, plan: SheetPlan | None) -> SheetPlan | None:
         """Return a plan, None for one without sheets, with further sheets as long as they are allowed and worth it."""
         axes = () if plan is None else plan.axes
         while sum(len(about.sides) for about in axes) < self.requirements.max_sheets:
-            further = self.further(axes, surveys)
+            further = self.further(axes)
             if further is None:
                 break
             axes = (*axes, further)
         return SheetPlan(axes) if axes else None
 
-    def further(self, axes: tuple[AxisPlan, ...], surveys: list[AxisSurvey]) -> AxisPlan | None:
+    def further(self, axes: tuple[AxisPlan, ...]) -> AxisPlan | None:
         """Return the largest sheet that can be added to plans, made on a fine profile; None where none is worth it.
 
         Args:
             axes: plans about axes, made on fine profiles; none for the largest sheet by itself.
-            surveys: of all axes.
         """
         least = self.requirements.least_gain if axes else 0.0
-        single = ((plans[0].area, n) for n, plans in enumerate(self.alone(surveys)) if plans)
+        single = ((plans[0].area, n) for n, plans in enumerate(self.alone) if plans)
         hopes = sorted((hope for hope in single if hope[0] > least), reverse=True)
         tries = _MAX_COMPLETIONS if axes else _LAST_TRIES
         found: list[Choice] = []
         for hope, number in hopes:
             if len(found) >= tries and hope <= found[tries - 1].plan.area:  # what is there can only take from it
                 break
-            clear = kept_clear(surveys[number].profile, list(axes), self.requirements)
-            about = plan_sheets(clear, surveys[number].lines, self.loose, 1)
+            survey = self.surveys[number]
+            clear = kept_clear(survey.profile, list(axes), self.requirements)
+            about = plan_sheets(clear, survey.lines, self.loose, 1)
             found += [Choice(number, one) for one in about if one.area > least]
             found.sort(key=lambda choice: -choice.plan.area)
         best: AxisPlan | None = None
@@ -182,13 +184,6 @@ class FineStage:
             if best is None or made.area > best.area:
                 best = made
         return best
-
-    def alone(self, surveys: list[AxisSurvey]) -> list[list[AxisPlan]]:
-        """Return the coarse plans about each axis by itself, of one sheet, two sheets ... (``plan_sheets``)."""
-        if not self._alone:
-            most = self.requirements.max_sheets
-            self._alone.extend(plan_sheets(one.profile, one.lines, self.loose, most) for one in surveys)
-        return self._alone
 
     def _first_of(self, choice: Choice) -> AxisPlan | None:
         key = (choice.axis, choice.kinds)

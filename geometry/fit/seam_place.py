@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,18 +28,7 @@ _SEAM_MARGIN = math.radians(15.0)  # rad on both sides of a seam that its electr
 _MIN_SHIELDED_SHARE = 0.005  # of the half-space; a smaller difference between the sides is the error of the rays
 
 
-class _ChosenSeam(NamedTuple):
-    """Where the seam about one axis was put."""
-
-    direction: tuple[float, float, float]  #: in which it faces, in the frame of the link
-    shielded: float  #: share of the half-space above it that the link shields
-    least: float  #: the same on the most exposed side
-    reason: str  #: a sentence for a person
-
-
-def place_seams(
-    fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None
-) -> tuple[LinkFit, tuple[_ChosenSeam, ...]]:
+def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -> tuple[LinkFit, tuple[str, ...]]:
     """Turn the full wraps of a fit until their seams lie where the link shields them most.
 
     Sheets about one axis are turned together, so that their cables run side by side. Partial wraps stay: they have no
@@ -50,10 +38,13 @@ def place_seams(
         fit: of a link.
         mesh: the link.
         weights: where touches are likely; the free space of a place counts as much as its weight.
+
+    Returns:
+        the fit, and a sentence for each axis that says where its seam faces, and why.
     """
     rays = RayCaster(mesh)
     sheets = list(fit.sheets)
-    places: list[_ChosenSeam] = []
+    reasons: list[str] = []
     for axis in dict.fromkeys(sheet.axis for sheet in sheets):
         full = [i for i, sheet in enumerate(sheets) if sheet.axis == axis and sheet.frustum.wrap == math.tau]
         if not full:
@@ -77,9 +68,8 @@ def place_seams(
         direction = sheets[full[0]].placed.link_frustum.rotate((1.0, 0.0, 0.0))
         numbers = [str(i + 1) for i in full]
         names = f"{', '.join(numbers[:-1])} and {numbers[-1]}" if len(numbers) > 1 else numbers[0]
-        reason = _reason(names, direction, shielded, least, weights, even and flat is not None)
-        places.append(_ChosenSeam(direction, shielded, least, reason))
-    return replace(fit, sheets=tuple(sheets)), tuple(places)
+        reasons.append(_reason(names, direction, shielded, least, weights, even and flat is not None))
+    return replace(fit, sheets=tuple(sheets)), tuple(reasons)
 
 
 def _touches_around(placed: PlacedFrustum, rays: RayCaster, weights: TouchWeights | None) -> Floats:

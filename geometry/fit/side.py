@@ -25,7 +25,7 @@ Interval = tuple[int, int]  #: first slice and the one after the last
 _ROUNDING_ERROR = 1e-9  # m; so that no interval is given up that is good by rounding
 
 
-def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float]:
+def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float, int]:
     """Return the straight side with the least largest distance from all slices (Chebyshev fit).
 
     Args:
@@ -34,14 +34,9 @@ def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float
         low: smallest radii [m], shape (k,).
 
     Returns:
-        largest distance between side and slices, square to the side [m]; radius at z = 0 [m]; slope dr/dz.
+        largest distance between side and slices, square to the side [m]; radius at z = 0 [m]; slope dr/dz; and the
+        first of the slices that by themselves deviate as much.
     """
-    deviation, radius, slope, _ = _chebyshev(z, high, low)
-    return deviation, radius, slope
-
-
-def _chebyshev(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float, int]:
-    """Return what ``least_deviation`` does, and the first of the slices that by themselves deviate as much."""
 
     def value(slope: float) -> tuple[float, float, float, float, int]:
         line = slope * z
@@ -112,7 +107,7 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
             if tops[end - 1] - limit <= radius <= bottoms[end - 1] + limit:
                 return True
         window = slice(first, end)
-        off, *side, deciding = _chebyshev(z[window], high[window], low[window])
+        off, *side, deciding = _least_deviation(z[window], high[window], low[window])
         if off > tolerance:
             bad = (first + deciding, end, off * math.hypot(1.0, side[1]))
             return False
@@ -320,7 +315,7 @@ def fit_side(
     straight = float(np.median(np.abs(means + offset * math.hypot(1.0, slope) - line))) < 0.15 * limit
     if run[1] > run[0] and (straight or run[1] - run[0] >= 0.97 * (end - first)):
         return StraightSide(first + run[0], first + run[1], column, columns, start, slope, offset)
-    _, start, slope = _least_deviation(z, high, low)
+    _, start, slope, _ = _least_deviation(z, high, low)
     return StraightSide(first, end, column, columns, start, slope)
 
 

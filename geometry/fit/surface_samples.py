@@ -76,7 +76,7 @@ def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000, seed: int = 1
         MeshError: no point is visible from outside.
     """
     rng = np.random.default_rng(seed)
-    face_normals, areas = mesh.normals_and_areas()
+    face_normals, areas = mesh.normals_and_areas
     total = np.cumsum(areas)
     face = np.searchsorted(total, (np.arange(count) + rng.random(count)) / count * total[-1], side="right")
     face = np.minimum(face, len(areas) - 1)

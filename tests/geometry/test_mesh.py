@@ -177,7 +177,7 @@ def test_arrays_are_read_only_and_the_pose_moves_points() -> None:
     np.testing.assert_allclose(moved.vertices[5], pose.apply(tuple(mesh.vertices[5])), atol=1e-12)
 
 
-def test_terms_of_ur20_and_ur30_are_told(tmp_path: Path) -> None:
+def test_terms_of_two_models_are_told(tmp_path: Path) -> None:
     """Design note, section 7: these meshes are not under the BSD licence of the others."""
     for robot, told in (("ur20", True), ("UR30", True), ("ur10", False)):
         (tmp_path / robot).mkdir()

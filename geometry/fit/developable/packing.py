@@ -20,7 +20,7 @@ from coneskin.geometry.fit.bare_areas import BareArea, BareTally, hull_note
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.fit_options import FitOptions, check_names
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.fit.fitted_sheet import FittedSheet, deviations
 from coneskin.geometry.fit.profile import RadialProfile, Region
 from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
@@ -331,14 +331,10 @@ def _checked(
     if narrow < options.min_radius * max(1.0, placed.sharpest_bend) or narrow * placed.frustum.wrap < options.min_arc:
         return None
     kept = slice(run[0], run[1])
-    seen = off[kept][~hole[kept]]
     covers = hull.below(placed, 1.5 * options.tolerance)
     sheet = FittedSheet(
         placed=placed,
-        max_deviation=float(np.abs(seen).max()) if seen.size else math.inf,
-        rms_deviation=math.sqrt(float((seen**2).mean())) if seen.size else math.inf,
-        bridged_share=float(hole[kept].mean()),
-        bridged_depth=float(-off[kept][hole[kept]].min()) if hole[kept].any() else 0.0,
+        **deviations(off[kept], hole[kept]),
         length_share=placed.frustum.slant / (profile.step * len(profile.z)),
         area_share=float(covers.mean()),
         facet_rise=rise,

@@ -6,6 +6,7 @@ rulings meet in x only if n (p - x) = 0, whatever its section is. In homogeneous
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.displacement_map import bridge_holes
-from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink
+from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, most_voted
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, Region
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
@@ -142,13 +143,12 @@ def _ruled_region(
 
 def _obliquity(radius: Floats, good: Bools) -> Floats:
     """Return by how much a distance along a ray exceeds that square to the surface, for each column, shape (p,)."""
-    shown = np.where(good & (radius > 0.0), radius, np.nan)  # a hole that is spanned may have no surface
     around = radius.shape[1]
-    section = np.ones(around)
-    for column in range(around):
-        values = shown[:, column][np.isfinite(shown[:, column])]
-        section[column] = float(np.median(values)) if len(values) else np.nan
-    if not np.isfinite(section).any():
+    there = good & (radius > 0.0)  # a hole that is spanned may have no surface
+    section = np.array(
+        [np.median(column[seen]) if seen.any() else np.nan for column, seen in zip(radius.T, there.T, strict=True)]
+    )
+    if not there.any():
         return np.ones(around)
     section = np.where(np.isfinite(section), section, np.nanmedian(section))
     slope = (np.roll(section, -1) - np.roll(section, 1)) / (4.0 * np.pi / around * section)
@@ -208,15 +208,9 @@ def _directions(
     length = np.linalg.norm(drawn, axis=1)
     drawn = drawn[length > 0.3] / length[length > 0.3, None]
     trials = np.concatenate([drawn, *(axis.axis[None] for axis in axes)])
-    votes = np.abs(samples.normals[voters] @ trials.T) < _RULING_GATE
-    left = np.ones(len(voters))
+    votes = (np.abs(samples.normals[voters] @ trials.T) < _RULING_GATE).astype(float)
     chosen: list[Floats] = []
-    while len(chosen) < _MAX_DIRECTIONS:
-        score = left @ votes
-        best = int(score.argmax())
-        if score[best] < _LEAST_SHARE * len(voters):
-            break
-        left[votes[:, best]] *= 0.3  # a flat of a box obeys several directions
+    for best in most_voted(votes, _LEAST_SHARE, 0.3):  # a flat of a box obeys several directions
         direction = trials[best]
         for gate in (2.0 * _RULING_GATE, _RULING_GATE, 0.5 * _RULING_GATE):
             near = samples.normals[np.abs(samples.normals @ direction) < gate]
@@ -226,9 +220,9 @@ def _directions(
         direction = direction * np.sign(direction[int(np.abs(direction).argmax())])
         if all(abs(direction @ other) < math.cos(_SAME_DIRECTION) for other in chosen):
             chosen.append(direction)
-        votes[:, best] = False
-        if not votes.any():
+        if len(chosen) == _MAX_DIRECTIONS:
             break
+        votes[:, best] = 0.0
     return chosen
 
 
@@ -270,14 +264,7 @@ def _apexes(samples: SurfaceSamples, voters: Ints, rng: np.random.Generator, siz
     if len(trials) == 0:
         return []
     chosen: list[Floats] = []
-    left = np.ones(len(voters))
-    votes = _votes(samples, voters, trials)
-    while len(chosen) < _MAX_APEXES:
-        score = left @ votes
-        best = int(score.argmax())
-        if score[best] < _LEAST_SHARE * len(voters):
-            break
-        left[votes[:, best]] = 0.0
+    for best in itertools.islice(most_voted(_votes(samples, voters, trials).astype(float), _LEAST_SHARE), _MAX_APEXES):
         apex = trials[best]
         for gate in (2.0 * _RULING_GATE, _RULING_GATE, 0.5 * _RULING_GATE):
             way = samples.points - apex

@@ -241,9 +241,6 @@ def _ends(trial: _Trial, side: Developable) -> tuple[Floats, Floats]:
 
 
 def _second_differences(count: int, full: bool) -> Floats:
-    rows = np.zeros((count, count))
-    for number in range(count):
-        rows[number, number] = -2.0
-        rows[number, (number + 1) % count] += 1.0
-        rows[number, (number - 1) % count] += 1.0
+    one = np.eye(count)
+    rows = np.roll(one, 1, axis=1) + np.roll(one, -1, axis=1) - 2.0 * one
     return rows if full else rows[1:-1]

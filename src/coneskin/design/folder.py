@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,24 +21,20 @@ from coneskin.core.errors import GeometryError
 from coneskin.core.text import printable
 from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
-from coneskin.geometry.drawing.nesting import MaterialBed, nest_on_beds
+from coneskin.geometry.drawing.nesting import nest_on_beds
 from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.solid import WrappedLayer, require_step_writer, to_stl, write_step
 
 from .report import report_text
 from .sheets.sheet_design import SheetDesign
-from .sheets.summary import design_summary, material_rows, sensor_toml
+from .sheets.summary import design_summary, material_rows, sensor_toml, sheet_folder
 from .workshop.build_figures import measure_build
 from .workshop.placement import find_datum_faces
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.mesh import Mesh
-
-    from .workshop.jig import Collar
-
-from coneskin.design.sheets.summary import sheet_folder
 
 #: summary of a design; only a folder with this file may be replaced
 DESIGN_FILE = "design.json"
@@ -150,63 +146,24 @@ def _own_files(target: Path) -> list[Path]:
     )
 
 
-def _write_sheets(
-    folder: Path,
-    designs: tuple[SheetDesign, ...],
-    data: dict[str, Any],
-    options: FileOptions,
-    progress: Callable[[str], None],
-    beds: Iterable[MaterialBed],
-    others: Iterable[str],
-    first_sensor: int,
-) -> None:
-    """Write drawings, sensor files, the table of materials and design.json.
+class _Draft:
+    """A folder in the making, and the paths in it of all files so far."""
 
-    The list of files is added to ``data``, with those that are in the folder already.
-    """
-    files: list[str] = list(others)
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.files = folder, list[str]()
 
-    def write(name: Path, content: str | bytes) -> None:
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
-        files.append(name.as_posix())
+    def write(self, name: Path, content: str | bytes) -> None:
+        self.place(name).write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
 
-    for index, design in enumerate(designs):
-        progress(f"{design.name}: writing drawings")
-        place = sheet_folder(designs, index)
-        write(place / "sensor.toml", sensor_toml(design, first_sensor + index, str(data["frame"])))
-        for cut in design.cuts:
-            _write_drawing(write, place / "cut" / cut.slug, (cut,), f"{design.name}, {cut.name}", options)
-        piece = make_test_piece("every material")
-        _write_drawing(write, place / "cut" / piece.slug, (piece,), f"{design.name}, test piece", options)
-        _write_drawing(write, place / "cut" / "all", nest_sheets(design.cuts), design.name, options)
-    for bed in beds:
-        progress(f"writing {bed.slug}")
-        stem = Path("nested") / bed.slug
-        write(stem.with_name(f"{stem.name}.dxf"), to_dxf(bed.sheets, options.arcs, options.tolerance))
-        write(stem.with_name(f"{stem.name}.svg"), to_svg(bed.sheets, bed.slug))
-    rows = material_rows(designs)
-    table = io.StringIO()
-    writer = csv.DictWriter(table, rows[0], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write(Path("materials.csv"), table.getvalue())
-    files.append(DESIGN_FILE)
-    data["files"] = files
-    (folder / DESIGN_FILE).write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    def place(self, name: Path) -> Path:
+        """Return where a new file belongs."""
+        self.files.append(name.as_posix())
+        (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
+        return self.folder / name
 
-
-def _write_drawing(
-    write: Callable[[Path, str | bytes], None],
-    stem: Path,
-    sheets: tuple[CutSheet, ...],
-    title: str,
-    options: FileOptions,
-) -> None:
-    write(stem.with_suffix(".dxf"), to_dxf(sheets, options.arcs, options.tolerance))
-    write(stem.with_suffix(".svg"), to_svg(sheets, title))
-    write(stem.with_suffix(".pdf"), to_pdf(sheets, options.page, title))
+    def write_drawing(self, stem: Path, sheets: tuple[CutSheet, ...], title: str, options: FileOptions) -> None:
+        self.write(stem.with_name(f"{stem.name}.dxf"), to_dxf(sheets, options.arcs, options.tolerance))
+        self.write(stem.with_name(f"{stem.name}.svg"), to_svg(sheets, title))
 
 
 def write_design(
@@ -274,37 +231,62 @@ def write_design(
         {"file": f"nested/{bed.slug}", "material": bed.material, "waste": round(bed.waste, 4)} for bed in beds
     ]
     data["larger_than_bed"] = list(larger)
-    with _new_folder(Path(folder), replace) as draft:
+    with _new_folder(Path(folder), replace) as temporary:
+        draft = _Draft(temporary)
         drawn: list[tuple[str, str]] = []
         if pictures:
             from .pictures import draw_pictures
 
             tolerance, areas = (0.0, ()) if fit is None else (fit.tolerance, fit.bare_areas)
             weights = None if fit is None else fit.touch_weights
-            drawn = draw_pictures(draft, sheets, figures, mesh, tolerance, progress, areas, weights)
+            drawn = draw_pictures(temporary, sheets, figures, mesh, tolerance, progress, areas, weights)
+            draft.files += [file for _, file in drawn]
         notes = (*notes, *larger, f"Frame of all poses: {frame}")
-        text = report_text(sheets, figures, title, notes, fit, drawn, beds, first_sensor)
-        (draft / "report.md").write_text(text, encoding="utf-8")
-        written = ["report.md", *(file for _, file in drawn)]
+        draft.write(Path("report.md"), report_text(sheets, figures, title, notes, fit, drawn, beds, first_sensor))
         for index, (design, item) in enumerate(zip(sheets, figures, strict=True)):
+            place = sheet_folder(sheets, index)
+            progress(f"{design.name}: writing drawings")
+            draft.write(place / "sensor.toml", sensor_toml(design, first_sensor + index, frame))
+            _write_cuts(draft, place / "cut", design, options)
             if item.collars:
                 progress(f"{design.name}: writing the jig")
-                written += _write_jig(draft, sheet_folder(sheets, index), design, item.collars)
+            for collar in item.collars:
+                for part in collar.parts:
+                    words = f"{design.options.link} {design.name} {collar.slug(part)}".strip()
+                    draft.write(place / "jig" / f"{collar.slug(part)}.stl", to_stl(part.surface, words))
             if options.step:
                 progress(f"{design.name}: writing the wrapped layers")
-                written.append(_write_wrapped(draft, sheet_folder(sheets, index), design))
-        _write_sheets(draft, sheets, data, options, progress, beds, written, first_sensor)
-        progress(f"{sum(1 for path in draft.rglob('*') if path.is_file())} files in {folder}")
+                write_step(draft.place(place / "wrapped.step"), _wrapped_layers(design))
+        for bed in beds:
+            progress(f"writing {bed.slug}")
+            draft.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, options)
+        rows = material_rows(sheets)
+        table = io.StringIO()
+        writer = csv.DictWriter(table, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        draft.write(Path("materials.csv"), table.getvalue())
+        data["files"] = [*draft.files, DESIGN_FILE]
+        draft.write(Path(DESIGN_FILE), json.dumps(data, indent=2) + "\n")
+        progress(f"{len(draft.files)} files in {folder}")
     return data
 
 
-def _require_step(sheets: Sequence[SheetDesign]) -> None:
-    """Refuse STEP files before anything is drawn.
+def _write_cuts(draft: _Draft, folder: Path, design: SheetDesign, options: FileOptions) -> None:
+    """Write each layer of a sheet, the test piece, and all of them together."""
+    piece = make_test_piece("every material")
+    drawings: list[tuple[str, tuple[CutSheet, ...], str]] = [
+        *((cut.slug, (cut,), f"{design.name}, {cut.name}") for cut in design.cuts),
+        (piece.slug, (piece,), f"{design.name}, test piece"),
+        ("all", nest_sheets(design.cuts), design.name),
+    ]
+    for name, sheets, title in drawings:
+        draft.write_drawing(folder / name, sheets, title, options)
+        draft.write(folder / f"{name}.pdf", to_pdf(sheets, options.page, title))
 
-    Raises:
-        GeometryError: a sheet is not round.
-        MissingExtra: cadquery-ocp is not installed.
-    """
+
+def _require_step(sheets: Sequence[SheetDesign]) -> None:
+    """Refuse STEP files before anything is drawn."""
     for sheet in sheets:
         if sheet.place.bends:
             raise GeometryError(
@@ -314,30 +296,11 @@ def _require_step(sheets: Sequence[SheetDesign]) -> None:
     require_step_writer()
 
 
-def _write_wrapped(draft: Path, place: Path, design: SheetDesign) -> str:
-    """Write the layers of a sheet as they lie on the link as a STEP file; return its path in the folder.
-
-    Raises:
-        GeometryError: the CAD kernel refuses a layer.
-    """
+def _wrapped_layers(design: SheetDesign) -> list[WrappedLayer]:
+    """Return the layers of a sheet as they lie on the link."""
     stack = design.options.stack
-    layers = []
-    for index, layer in enumerate(stack.layers):
-        inner = design.place.parallel(stack.face_offset(index))
-        layers.append(WrappedLayer(f"{design.name} {layer.name}", inner.frustum, layer.thickness, inner.link_frustum))
-    (draft / place).mkdir(parents=True, exist_ok=True)
-    write_step(draft / place / "wrapped.step", layers)
-    return (place / "wrapped.step").as_posix()
-
-
-def _write_jig(draft: Path, place: Path, design: SheetDesign, collars: Sequence[Collar]) -> list[str]:
-    """Write the parts of a jig as STL files; return their paths in the folder."""
-    (draft / place / "jig").mkdir(parents=True)
-    written = []
-    for collar in collars:
-        for part in collar.parts:
-            name = place / "jig" / f"{collar.slug(part)}.stl"
-            title = f"{design.options.link} {design.name} {collar.slug(part)}".strip()
-            (draft / name).write_bytes(to_stl(part.surface, title))
-            written.append(name.as_posix())
-    return written
+    inner = [design.place.parallel(stack.face_offset(index)) for index in range(5)]
+    return [
+        WrappedLayer(f"{design.name} {layer.name}", side.frustum, layer.thickness, side.link_frustum)
+        for layer, side in zip(stack.layers, inner, strict=True)
+    ]

@@ -16,7 +16,7 @@ from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.drawing.electrode_layout import NARROWEST_PLAN
 from coneskin.geometry.fit.fit_options import check_names
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import MAX_LENGTH, Mesh, load_mesh
+from coneskin.geometry.mesh import MAX_LENGTH, Mesh, load_mesh, terms_of
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 #: words in the name of a file or folder
 _VISUAL_WORDS, _HULL_WORDS = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
-_RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +91,7 @@ def load_link(
             errors.append(exc)
             continue
         said = tuple(str(error) for error in errors)
-        notes = (f"{kind} mesh of the URDF", *said, *_terms(path + name), *mesh.notes)
+        notes = (f"{kind} mesh of the URDF", *said, *dict.fromkeys((*terms_of(path + name), *mesh.notes)))
         yield LinkMesh(name, mesh, f"the URDF link {name}", notes, kind == "visual")
     if len(errors) == 2:
         raise errors[0]
@@ -100,7 +99,7 @@ def load_link(
 
 def _named(mesh: Mesh, file: str) -> LinkMesh:
     """Return a mesh as the link that its source names."""
-    notes = (*_terms(mesh.source), *mesh.notes)
+    notes = tuple(dict.fromkeys((*terms_of(mesh.source), *mesh.notes)))
     return LinkMesh(
         Path(mesh.source).stem, mesh, f"the mesh's coordinates in {file}", notes, _called_visual(mesh.source)
     )
@@ -177,19 +176,10 @@ def with_seams(
     """Return a link with its seams at the places that it shields, and with a note of each reason."""
     from coneskin.geometry.fit.seam_place import place_seams
 
-    fit, places = place_seams(fit, source.mesh, weights)
-    for place in places:
-        progress(place.reason)
-    return replace(source, notes=(*source.notes, *(place.reason for place in places))), fit
-
-
-def _terms(name: str) -> tuple[str, ...]:
-    if not _RESTRICTED_MODELS.search(name):
-        return ()
-    return (
-        "this looks like a mesh of a UR20 or UR30: Universal Robots' terms for these forbid physical models for "
-        "commercial purposes",
-    )
+    fit, reasons = place_seams(fit, source.mesh, weights)
+    for reason in reasons:
+        progress(reason)
+    return replace(source, notes=(*source.notes, *reasons)), fit
 
 
 class NothingFits(GeometryError):

@@ -91,7 +91,7 @@ class _View:
         picture = np.zeros((len(hit), 4))
         picture[hit, :3], picture[hit, 3] = colours(face[hit], origins[hit] - depth[hit, None] * self.way), 1.0
         if light is not None:
-            bright = np.abs(self._body.normals_and_areas()[0][face[hit]] @ (light / np.linalg.norm(light)))
+            bright = np.abs(self._body.normals_and_areas[0][face[hit]] @ (light / np.linalg.norm(light)))
             picture[hit, :3] *= (1.0 - _GRAZING_SHADE + _GRAZING_SHADE * bright)[:, None]
         shape = len(y), len(x)
         deep = np.where(hit, depth, 3.0 * far).reshape(shape)

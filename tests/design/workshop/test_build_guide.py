@@ -17,7 +17,7 @@ from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
-from coneskin.geometry.drawing.touch_marks import CoverMarks
+from coneskin.geometry.drawing.touch_marks import CoverMarks, marks_on_link
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
@@ -242,7 +242,7 @@ def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
     assert [int(row[0]) for row in rows] == list(range(1, 10))
     surface = design.cuts[6].surface
     stack, flat = design.options.stack, design.layout
-    drawn = list(CoverMarks.of(flat, flat, surface, stack, design.place).labels())
+    drawn = list(CoverMarks(flat, surface, marks_on_link(flat, stack, design.place)).labels())
     for (_, u, phi), label in zip(rows, drawn, strict=True):
         x, y = drawing_point(surface, 1e-3 * float(u), math.radians(float(phi)))
         assert math.dist((x, y), (label.x, label.y)) < 8e-3

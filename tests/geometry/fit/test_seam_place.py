@@ -1,6 +1,7 @@
 """Place of the seam: behind what stands out from the link; anywhere where nothing does, and always the same."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -43,13 +44,14 @@ def test_the_seam_lies_behind_what_stands_out() -> None:
     azimuth = 3.0
     mesh = tube_with_wing(azimuth)
     before = fitted(mesh)
-    after, (place,) = place_seams(before, mesh)
+    after, (reason,) = place_seams(before, mesh)
     placed_sheet = after.sheets[0].placed
     wing = TILTED.rotate((math.cos(azimuth), math.sin(azimuth), 0.0))
-    cosine = sum(a * b for a, b in zip(wing, place.direction, strict=True))
+    cosine = sum(a * b for a, b in zip(wing, placed_sheet.link_frustum.rotate((1.0, 0.0, 0.0)), strict=True))
     assert math.degrees(math.acos(min(1.0, cosine))) < 10.5, "to a step of the search"
-    assert place.shielded > place.least + 0.02
-    assert "the link itself shields" in place.reason
+    shielded, least = (float(share) for share in re.findall(r"([\d.]+)%", reason))
+    assert shielded > least + 2.0
+    assert "the link itself shields" in reason
     old, new = before.sheets[0].placed.link_frustum, placed_sheet.link_frustum
     assert new.translation == pytest.approx(old.translation), "the cone itself stays"
     assert new.rotate((0.0, 0.0, 1.0)) == pytest.approx(old.rotate((0.0, 0.0, 1.0)))
@@ -60,18 +62,18 @@ def test_a_map_of_touches_turns_the_seam_away_from_them() -> None:
     before = fitted(mesh)
     sheet = before.sheets[0].placed
     busy, quiet = (sheet.point(0.1, phi) for phi in (0.0, math.pi))
-    after, (place,) = place_seams(before, mesh, TouchWeights(np.array([busy, quiet]), np.array([1.0, 0.1]), "map.csv"))
+    after, (reason,) = place_seams(before, mesh, TouchWeights(np.array([busy, quiet]), np.array([1.0, 0.1]), "map.csv"))
     _, phi, _ = after.sheets[0].placed.locate(quiet)
     assert abs(math.remainder(phi, 2 * math.pi)) < 0.5 * math.pi
-    assert "touches count least by map.csv" in place.reason
+    assert "touches count least by map.csv" in reason
 
 
 def test_a_bare_tube_keeps_its_seam() -> None:
     mesh = tube_with_wing(None)
     before = fitted(mesh)
-    after, (place,) = place_seams(before, mesh)
+    after, (reason,) = place_seams(before, mesh)
     assert after.sheets[0].placed == before.sheets[0].placed
-    assert "shields no side more than another" in place.reason
+    assert "shields no side more than another" in reason
 
 
 @pytest.mark.long
@@ -85,16 +87,16 @@ def test_the_seams_of_several_sheets_are_named_one_by_one() -> None:
         ((half, whole), "the seam of sheet 2 faces ("),
         ((whole, half, whole, whole), "the seams of sheets 1, 3 and 4 face ("),
     ):
-        _, (place,) = place_seams(replace(fitted(mesh), sheets=sheets), mesh)
-        assert place.reason.startswith(words)
-        assert "of the link's frame" in place.reason
+        _, (reason,) = place_seams(replace(fitted(mesh), sheets=sheets), mesh)
+        assert reason.startswith(words)
+        assert "of the link's frame" in reason
 
 
 def test_partial_wraps_have_no_choice() -> None:
     mesh = tube_with_wing(None)
     before = cones(mesh, max_sheets=1, wrap=math.pi)
-    after, places = place_seams(before, mesh)
-    assert places == ()
+    after, reasons = place_seams(before, mesh)
+    assert reasons == ()
     assert after.sheets == before.sheets
 
 
@@ -108,9 +110,9 @@ def test_the_seam_of_a_stadium_lies_on_a_flat_of_it() -> None:
     side = Developable(Frustum(radius, radius, 0.2), TILTED @ Pose(translation=(0.05 - radius, 0.0, 0.0)), bends)
     assert tube.distances(side.place(0.1, np.linspace(0.0, math.tau, 90))[0]).max() < 1e-6
     before = LinkFit((FittedSheet(side, 1e-4, 1e-4, 0.0, 0.0, 1.0, 1.0, 0.0),), None, 1e-3, 0.2, 0.05, (), "", 1)
-    after, (place,) = place_seams(before, tube.mesh())
+    after, (reason,) = place_seams(before, tube.mesh())
     seam = after.sheets[0].placed
     one, two = (seam.normal(math.radians(angle)) for angle in (-14.0, 14.0))
     assert math.dist(one, two) < 1e-9, "no bend under the seam and its electrodes"
     assert seam.place(0.1, 0.7)[0] == pytest.approx(side.place(0.1, 0.7 + side.locate(seam.point(0.1, 0.0))[1])[0])
-    assert "flattest" in place.reason
+    assert "flattest" in reason

@@ -14,16 +14,12 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from coneskin.core.arrays import frozen
+from coneskin.core.arrays import Bools, Floats, Ints, frozen
 from coneskin.geometry.drawing.electrode_layout import SheetLayout
 from coneskin.geometry.drawing.surface_shape import ShapeTab, SheetSide
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 CABLE_RADIUS = 2e-3  # m; of four wires together
 _CABLE_LIFT = CABLE_RADIUS + 0.5e-3  # m; of its middle, which nothing must come nearer to than its radius
@@ -53,7 +49,7 @@ def _ways_around(normals: Floats) -> list[Floats]:
 class Body(Protocol):
     """Something in the way of a cable."""
 
-    def near(self, points: Floats, distance: float) -> Mask:
+    def near(self, points: Floats, distance: float) -> Bools:
         """Return whether each point, shape (n, 3) [m], is nearer to the body than a distance [m]."""
         ...
 
@@ -77,7 +73,7 @@ class SheetBody:
             beside = np.maximum(np.maximum(-phi, phi - side.wrap), 0.0) * radius
         return np.asarray(np.sqrt(along**2 + off**2 + beside**2))
 
-    def near(self, points: Floats, distance: float) -> Mask:
+    def near(self, points: Floats, distance: float) -> Bools:
         """Return whether each point is at most a distance away [m]."""
         return np.asarray(self.distances(points) <= distance)
 
@@ -89,7 +85,7 @@ class _StrandBody:
     points: Floats
     radius: float
 
-    def near(self, points: Floats, distance: float) -> Mask:
+    def near(self, points: Floats, distance: float) -> Bools:
         """Return whether each point is nearer than a distance to a sphere."""
         from scipy.spatial import cKDTree
 
@@ -131,7 +127,7 @@ class TabApron:
     u: float
     phi: float
     feet: Floats
-    tips: NDArray[np.int64]
+    tips: Ints
     way_out: Floats
     slope: float = 0.0
 
@@ -292,7 +288,7 @@ class LinkSurface:
         return u, np.concatenate([across, side.wrap + open_angle * np.arange(1, count) / count]), True
 
     @cached_property
-    def _cells(self) -> tuple[Floats, Floats, Floats, Mask, Mask]:
+    def _cells(self) -> tuple[Floats, Floats, Floats, Bools, Bools]:
         """Points on the link, normals, heights above the side, which cells can be used, and which hang in the air."""
         u, phi, _ = self._axes
         side = self.place.frustum
@@ -328,7 +324,7 @@ class LinkSurface:
         steep = np.einsum("ijk,ijk->ij", local, normals)[..., None] < 0.5
         return np.asarray(np.where(steep, normals, local).reshape(-1, 3))
 
-    def _level(self, cells: NDArray[np.int64]) -> Mask:
+    def _level(self, cells: Ints) -> Bools:
         """Return whether a mount on each cell stands on the link without meeting it."""
         points, normals = (array[cells] for array in self._cells[:2])
         level = np.ones(len(cells), bool)
@@ -341,7 +337,7 @@ class LinkSurface:
         return level
 
     @cached_property
-    def _edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats, Mask]:
+    def _edges(self) -> tuple[Ints, Ints, Floats, Bools]:
         """Neighbors that a cable joins: numbers of both, distance [m]; and the cells on which a mount lies flat."""
         u, phi, around = self._axes
         points, normals, height, usable, _ = self._cells
@@ -405,7 +401,7 @@ class LinkSurface:
                     return found
         return None
 
-    def _sources(self, apron: TabApron, own: SheetBody) -> tuple[NDArray[np.int64], Floats]:
+    def _sources(self, apron: TabApron, own: SheetBody) -> tuple[Ints, Floats]:
         """Return the cells just beyond the rim at which wires may leave, and how far from their middle each is [m]."""
         from scipy.spatial import cKDTree
 
@@ -418,9 +414,9 @@ class LinkSurface:
         self,
         apron: TabApron,
         side: SheetSide,
-        sources: tuple[NDArray[np.int64], Floats],
-        free: Mask,
-        tied: Mask,
+        sources: tuple[Ints, Floats],
+        free: Bools,
+        tied: Bools,
         length: float,
         hangs: bool,
     ) -> CableWay | None:

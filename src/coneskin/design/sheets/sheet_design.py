@@ -12,8 +12,9 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError, SensorError
 from coneskin.geometry.drawing.cut_sheet import CutSheet, FaceUp, cut_sheets
 from coneskin.geometry.drawing.electrode_layout import (
@@ -186,12 +187,12 @@ class SheetDesign:
         """Whether its two edges meet, or nearly; otherwise the link is bare between them."""
         return self.place.frustum.wrap > 2.0 * math.pi - 0.5
 
-    def outer_face(self, u: ArrayLike, phi: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def outer_face(self, u: ArrayLike, phi: ArrayLike) -> tuple[Floats, Floats]:
         """Return points of the outer face [m], shape (..., 3), and their normals, at u [m] and phi [rad]."""
         points, normals = self.place.place(u, phi)
         return points + self.options.stack.thickness * normals, normals
 
-    def outer_triangles(self) -> NDArray[np.float64]:
+    def outer_triangles(self) -> Floats:
         """Return the triangles of the outer face [m], shape (n, 3, 3)."""
         side = self.place.frustum
         u, phi = np.meshgrid(np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181), indexing="ij")

@@ -12,7 +12,7 @@ from coneskin.geometry.drawing.electrode_layout import (
     SurfaceRectangle,
     best_layout,
 )
-from coneskin.geometry.drawing.touch_marks import touch_marks
+from coneskin.geometry.drawing.touch_marks import mark_parts
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.sector import Sector, unroll
@@ -24,7 +24,7 @@ from .sheet_design import SheetDesign
 
 def design_summary(design: SheetDesign) -> dict[str, Any]:
     """Return the figures of one sheet as plain data; lengths in mm, angles in degrees, None for infinite."""
-    layout, stack = design.layout, design.options.stack
+    layout, stack, active = design.layout, design.options.stack, design.active.frustum
     data: dict[str, Any] = {
         "name": design.name,
         "link_cone": _shape(design.place.frustum) | _pose(design.place),
@@ -35,8 +35,12 @@ def design_summary(design: SheetDesign) -> dict[str, Any]:
         "active_patch": _patch(layout.active),
         "field_patch": _patch(layout.field),
         "touch_marks": [
-            {"number": mark.number, "u_mm": _round(1e3 * mark.u), "phi_deg": _round(math.degrees(mark.phi))}
-            for mark in touch_marks(design.active.frustum)
+            {
+                "number": number,
+                "u_mm": _round(1e3 * u * active.slant),
+                "phi_deg": _round(math.degrees(phi * active.wrap)),
+            }
+            for number, (u, phi) in enumerate(mark_parts(), 1)  # from the inner edges of B and D
         ],
         "layers": [
             {

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Bools, Floats
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab
@@ -27,8 +27,6 @@ from .link_excess import LinkExcess
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
-
-Floats = NDArray[np.float64]
 
 
 def with_sheets(mesh: Mesh, others: Sequence[SheetDesign]) -> Mesh:
@@ -68,7 +66,7 @@ _MAX_PLAY = 12  # columns of a degree; a collar that can be turned further does 
 
 def _lip_play(
     link: LinkExcess,
-    lips: Sequence[tuple[Floats, Floats, NDArray[np.bool_]]],
+    lips: Sequence[tuple[Floats, Floats, Bools]],
     wanted: float,
     clearance: float,
     facets: float = 0.0,
@@ -330,7 +328,7 @@ class _Builder:
         )
         return shell_surface(inner, outer)
 
-    def _above_tabs(self, phi: Floats) -> NDArray[np.bool_]:
+    def _above_tabs(self, phi: Floats) -> Bools:
         """Tell at which azimuths tabs leave under the lip."""
         radius = self.side.radius1 if self.end == 1 else self.side.radius2
         tabs = [

@@ -11,14 +11,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-
-Floats = NDArray[np.float64]
 
 _EDGE_STEP = 0.4e-3  # m; between the points at which an edge is looked at
 _GRID_MARGIN = 1e-3  # m; before the end of the sheet, and beyond the reach, that is looked at too

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
 if TYPE_CHECKING:
     from coneskin.geometry.mesh import Mesh
-
-Floats = NDArray[np.float64]
 
 _FLAT_DISTANCE = 0.2e-3  # m; corners so near to a plane lie in it
 _ALIGNED_COSINE = math.cos(math.radians(2.0))  # faces of the mesh that are tilted less against a plane belong to it
