@@ -13,7 +13,6 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import Self
 
 from coneskin.core.channel import Channel
@@ -64,9 +63,7 @@ class Deadman:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._closed.set()
         self._thread.join()
         self._limit_lock(_LAST_WHILE)  # the interpreter's own end may block in a library as well

@@ -15,10 +15,7 @@ _HEADER_KEYS = ("coneskin", "commit", "build")  # of a recording
 
 @cache
 def _code_commit() -> str:
-    """Return the commit that the code was checked out from; empty where it was installed otherwise.
-
-    It is read from the files of git, without git. Changes that are not committed do not show.
-    """
+    """Return the commit that the code was checked out from, by the files of git; empty where it was installed."""
     git = Path(__file__).resolve().parents[3] / ".git"
     try:
         if git.is_file():  # a work tree of its own

@@ -52,7 +52,7 @@ def _pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent]) -> list
             pairs.append((one_group[0], other_group[0]))
         else:
             pairs += _pair_group(one_group, other_group)
-    return sorted(pairs, key=_order)
+    return sorted(pairs, key=lambda pair: ((e := _either_event(pair)).time, e.name not in SKIN_EVENTS))
 
 
 def _either_event(pair: _EventPair) -> GuardEvent:
@@ -60,11 +60,6 @@ def _either_event(pair: _EventPair) -> GuardEvent:
     event = pair[0] if pair[0] is not None else pair[1]
     assert event is not None
     return event
-
-
-def _order(pair: _EventPair) -> tuple[float, bool]:
-    event = _either_event(pair)
-    return event.time, event.name not in SKIN_EVENTS
 
 
 def _grouped(events: Sequence[GuardEvent]) -> dict[tuple[str, str], list[GuardEvent]]:

@@ -23,11 +23,7 @@ _ANSWER_PERIOD = 0.05  # s between two looks at what else may have ended a wait
 
 
 class _ArmRequests:
-    """Requests to one driver process.
-
-    Args:
-        check: raises what has stopped the arm, if anything has; its argument is True where something certainly has.
-    """
+    """Requests to one driver process; ``check`` as of ``ArmClient``."""
 
     def __init__(self, channel: Channel, check: Callable[[bool], None]) -> None:
         self.channel = channel
@@ -42,11 +38,6 @@ class _ArmRequests:
         """Send a request, wait for its answer and return it.
 
         One that a busy computer held up until it was void is sent once more: whoever asked still waits.
-
-        Raises:
-            Collision: the skin was touched.
-            RobotRefused: the guard, the controller or the driver process does not do it.
-            RobotConnectionError: the driver process is gone.
         """
         for _ in range(_MAX_ATTEMPTS):
             answer = self._do(request)

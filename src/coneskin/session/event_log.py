@@ -227,11 +227,9 @@ _CLOSE_TIMEOUT = 2.0  # s for the function to take what still waits
 
 
 class _EventDelivery:
-    """Delivery of events to one function, in order, until ``close``.
+    """Delivery of events to a program's function, in order, until ``close``; one that has raised is not called again.
 
-    Args:
-        on_event: the program's function; one that has raised is not called any more.
-        bound: number of events that may wait; what comes beyond it is dropped, and the function is told how many.
+    What comes beyond a bound of events that wait is dropped, and the function is told how many.
     """
 
     def __init__(self, on_event: Callable[[GuardEvent], None], bound: int = _MAX_WAITING) -> None:

@@ -282,9 +282,7 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         "stopScript": _Method(_true(_stop), "stop", "stops the arm; the session ends the program on the controller"),
         "getAsyncOperationProgress": _Method(_progress, "progress"),
         "getAsyncOperationProgressEx": _Method(
-            lambda arm: _AsyncOperationStatus(arm.progress()),
-            "progress",
-            "isAsyncOperationRunning and progress alone",
+            lambda arm: _AsyncOperationStatus(arm.progress()), "progress", "isAsyncOperationRunning and progress alone"
         ),
         "setTcp": _Method(_true(ArmClient.set_tcp), "set_tcp", "while the arm stands"),
         "setPayload": _Method(_true(_set_payload), "set_payload", "while the arm stands"),

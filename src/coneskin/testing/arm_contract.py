@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 from coneskin.core.channel import wait_readable
@@ -22,6 +23,8 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader
 from coneskin.robot.driver.values import ControllerState, StopPath
+
+from . import expect_error
 
 _CHECK_TIMEOUT = 20.0  # s; far beyond what a controller needs, so reached only where the contract is broken
 _MOTION_SPEED = 0.1  # rad/s of the leading joint, from which on the arm moves
@@ -134,22 +137,17 @@ def _check_nonsense_is_an_error(open_arm: OpenArm) -> None:
             wait_readable([reader], _CHECK_TIMEOUT)
             payloads = reader.read()
     for payload in (b"", payloads[0][:-1], payloads[0] + b"\0", b"\xff" * len(payloads[0])):
-        try:
-            arm.driver.decode_state(0.0, payload)
-        except RobotConnectionError:
-            continue
-        raise AssertionError(f"decode_state takes {payload[:40]!r} for a state")
+        takes = f"decode_state takes {payload[:40]!r} for a state"
+        expect_error(RobotConnectionError, partial(arm.driver.decode_state, 0.0, payload), takes)
 
 
 def _check_the_arm_of_another_table_is_refused(open_arm: OpenArm) -> None:
     """Check that ``check_model`` takes the arm, and refuses one whose first joint is 0.3 m higher."""
     with open_arm() as arm:
         arm.driver.check_model(arm.model, arm.host)
-        try:
-            arm.driver.check_model(replace(arm.model, d=(arm.model.d[0] + 0.3, *arm.model.d[1:])), arm.host)
-        except RobotRefused:
-            return
-        raise AssertionError("check_model takes another arm for the scene's")
+        higher = replace(arm.model, d=(arm.model.d[0] + 0.3, *arm.model.d[1:]))
+        takes = "check_model takes another arm for the scene's"
+        expect_error(RobotRefused, partial(arm.driver.check_model, higher, arm.host), takes)
 
 
 def _check_a_lost_controller_is_an_error_and_stays_one(open_arm: OpenArm) -> None:
@@ -192,11 +190,8 @@ def _check_closing_twice_is_fine_and_reading_then_is_not(open_arm: OpenArm) -> N
 
 
 def _expect_connection_error(name: str, call: Callable[[], object]) -> None:
-    try:
-        call()
-    except RobotConnectionError:
-        return
-    raise AssertionError(f"{name} must raise RobotConnectionError where the controller is gone")
+    otherwise = f"{name} must raise RobotConnectionError where the controller is gone"
+    expect_error(RobotConnectionError, call, otherwise)
 
 
 #: Every check, in the order in which a driver is written.

@@ -6,7 +6,6 @@ A recording that grows is read chunk by chunk, without a lock, by another proces
 from __future__ import annotations
 
 import math
-import os
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -134,7 +133,8 @@ def read_recording(path: Path, progress: Progress = silent) -> Recording:
     extents: list[Extent] = []
     damages: list[tuple[Path, int, Damage]] = []  # with the number of extents before it
     run: int | None = None
-    sizes = [_size(part) for part in paths]  # what is written meanwhile is not waited for
+    with explain_os_error(RecordingError, f"cannot read the recording {path}"):
+        sizes = [part.stat().st_size for part in paths]  # what is written meanwhile is not waited for
     total, done = max(sum(sizes), 1), 0
     for part, size in zip(paths, sizes, strict=True):
         with open_recording(part) as file:
@@ -172,11 +172,6 @@ def open_recording(path: Path) -> BinaryIO:
     """
     with explain_os_error(RecordingError, f"cannot read the recording {path}"):
         return open_file(path, MAX_SIZE)
-
-
-def _size(path: Path) -> int:
-    with open_recording(path) as file:
-        return os.fstat(file.fileno()).st_size
 
 
 def _refuse(path: Path, head: bytes) -> None:

@@ -142,10 +142,7 @@ def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
         for piece in pieces:
             part = pa.table(dict(piece), schema=None if writer is None else writer.schema)
             if writer is None:
-                kinds = [
-                    (column.name, pa.int64() if pa.types.is_null(column.type) else column.type)
-                    for column in part.schema
-                ]
+                kinds = [(c.name, pa.int64() if pa.types.is_null(c.type) else c.type) for c in part.schema]
                 writer = stack.enter_context(pq.ParquetWriter(path, pa.schema(kinds), compression="zstd"))
                 part = part.cast(writer.schema)
             writer.write_table(part)

@@ -176,9 +176,8 @@ class Run:
     @property
     def gap(self) -> float:
         """Time from which on inputs are missing [s]: what follows cannot be compared. Infinite where none are."""
-        return min(
-            (min(defect.since, defect.until) for defect in self.defects if defect.inputs_missing), default=math.inf
-        )
+        lost = (min(defect.since, defect.until) for defect in self.defects if defect.inputs_missing)
+        return min(lost, default=math.inf)
 
     @property
     def events(self) -> list[GuardEvent]:
