@@ -55,7 +55,7 @@ def run_with(model: str, root: Path, path: Path, seconds: float) -> Found:
     RtdeOutputs(controller)  # for get_rtde_value
     why = ""
     try:
-        made = translate(ProgramFolder(path.parent).load(path.name).text, Builtins.names(), Builtins.blocking())
+        made = translate(ProgramFolder(path.parent).load(path.name).text, Builtins.functions())
         controller.program_arrived()
         controller.load(made)
         for _ in range(round(seconds / controller.steptime)):

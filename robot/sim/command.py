@@ -133,7 +133,7 @@ def _serve(args: argparse.Namespace) -> int:
     options = Options(
         model=args.model,
         version=_version(args.version),
-        start_q=_start_q(args.model, args.start_q_deg),
+        start_q=[math.radians(q) for q in args.start_q_deg],
         start_delay=_time("--start-delay-ms", args.start_delay_ms, 60_000) / 1000.0,
         unlock_after=_time("--unlock-after-s", args.unlock_after_s, 3_600),
         after_protective_stop=args.protective_stop,
@@ -208,19 +208,6 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
             + "; Ctrl-C stops it",
             flush=True,
         )
-
-
-def _start_q(name: str, degrees: Sequence[float]) -> list[float]:
-    """Return joint positions [rad]; refuse those outside the limits of the arm."""
-    arm = arm_model(name)
-    start = [math.radians(q) for q in degrees]
-    for joint, (low, q, high) in enumerate(zip(arm.joint_lower, start, arm.joint_upper, strict=True), 1):
-        if not low <= q <= high:
-            raise RobotRefused(
-                f"--start-q-deg: joint {joint} of the {arm.name} must be from {math.degrees(low):g} to "
-                f"{math.degrees(high):g} deg, got {math.degrees(q):g} deg"
-            )
-    return start
 
 
 def _time(option: str, value: float, most: int) -> float:

@@ -15,9 +15,9 @@ import threading
 import time
 from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from queue import SimpleQueue
 
 from .machine.builtins import Builtins
 from .urscript.translator import Translation, translate
@@ -68,21 +68,19 @@ class Compiler:
 
     def __init__(self) -> None:
         self._known: dict[str, Translation] = {}
-        self._todo: SimpleQueue[tuple[int, str, bool] | None] = SimpleQueue()
-        self._done: SimpleQueue[Result] = SimpleQueue()
+        self._done: list[Result] = []
         self._waiting: deque[tuple[int, str, bool]] = deque()
         self._newest = 0  # number of the last program that is not a secondary one
-        self._thread: threading.Thread | None = None
+        self._pool = ThreadPoolExecutor(1)
+        self._long: list[tuple[int, bool, Future[Translation | ScriptError]]] = []  # handed to that thread
 
     def __enter__(self) -> Compiler:
-        self._thread = threading.Thread(target=self._translate_long_ones, args=(_start_worker(),), daemon=True)
-        self._thread.start()
+        self._worker = _start_worker()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._todo.put(None)
-        if self._thread is not None:
-            self._thread.join()
+        self._pool.shutdown(cancel_futures=True)
+        _end(self._worker)
 
     def submit(self, number: int, text: str, *, secondary: bool = False) -> None:
         """Translate a program; `results` returns it with its number, soon if it is short or was translated before.
@@ -93,22 +91,11 @@ class Compiler:
             secondary: it runs beside another, and neither overtakes nor is overtaken.
         """
         if len(self._waiting) >= _MAX_WAITING:
-            self._done.put((number, ScriptError(f"{_MAX_WAITING} programs wait already")))
+            self._done.append((number, ScriptError(f"{_MAX_WAITING} programs wait already")))
             return
         if not secondary:
             self._newest = number
         self._waiting.append((number, text, secondary))
-
-    def _begin(self, number: int, text: str, secondary: bool) -> None:
-        """Translate a program that waits, or hand it to the translating process."""
-        if not secondary and number < self._newest:
-            return
-        if text in self._known:
-            self._done.put((number, self._known[text]))
-        elif len(text) <= _IN_PLACE_LENGTH:
-            self._done.put((number, _translation(text)))
-        else:
-            self._todo.put((number, text, secondary))
 
     def check(self, text: str) -> None:
         """Translate a program that is short enough to be translated in place, and forget the result.
@@ -125,33 +112,41 @@ class Compiler:
         """Return what has been translated since the last call; once in each control cycle."""
         end = time.thread_time() + _IN_PLACE_TIME
         while self._waiting and time.thread_time() < end:
-            self._begin(*self._waiting.popleft())
-        ready = []
-        while not self._done.empty():
-            ready.append(self._done.get())
+            number, text, secondary = self._waiting.popleft()
+            if secondary or number >= self._newest:
+                self._begin(number, text, secondary)
+        for job in list(self._long):
+            number, secondary, made = job
+            if made.done():
+                self._long.remove(job)
+                self._done.append((number, made.result()))
+            elif not secondary and number < self._newest and made.cancel():
+                self._long.remove(job)
+        ready, self._done = self._done, []
         return ready
 
-    def _translate_long_ones(self, worker: subprocess.Popen[bytes]) -> None:
+    def _begin(self, number: int, text: str, secondary: bool) -> None:
+        """Translate a program that waits, or hand it to the translating process."""
+        if text in self._known:
+            self._done.append((number, self._known[text]))
+        elif len(text) <= _IN_PLACE_LENGTH:
+            self._done.append((number, _translation(text)))
+        else:
+            self._long.append((number, secondary, self._pool.submit(self._translate_long_one, text)))
+
+    def _translate_long_one(self, text: str) -> Translation | ScriptError:
         try:
-            while (job := self._todo.get()) is not None:
-                number, text, secondary = job
-                if not secondary and number < self._newest:
-                    continue
-                try:
-                    made = _ask(worker, text)
-                except (OSError, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
-                    why = f"the translation has failed, or took more than {_TRANSLATION_TIME:g} s: {type(exc).__name__}"
-                    self._done.put((number, ScriptError(why)))
-                    _end(worker)
-                    worker = _start_worker()
-                    continue
-                if isinstance(made, Translation):
-                    if len(self._known) >= _MAX_KNOWN:
-                        self._known.clear()
-                    self._known[text] = made
-                self._done.put((number, made))
-        finally:
-            _end(worker)
+            made = _ask(self._worker, text)
+        except (OSError, EOFError, pickle.UnpicklingError) as exc:  # it has died of this program
+            _end(self._worker)
+            self._worker = _start_worker()
+            why = f"the translation has failed, or took more than {_TRANSLATION_TIME:g} s: {type(exc).__name__}"
+            return ScriptError(why)
+        if isinstance(made, Translation):
+            if len(self._known) >= _MAX_KNOWN:
+                self._known.clear()
+            self._known[text] = made
+        return made
 
 
 def _start_worker() -> subprocess.Popen[bytes]:
@@ -191,6 +186,6 @@ def serve() -> None:
 
 def _translation(text: str) -> Translation | ScriptError:
     try:
-        return translate(text, Builtins.names(), Builtins.blocking())
+        return translate(text, Builtins.functions())
     except ScriptError as exc:
         return exc

@@ -25,7 +25,7 @@ from .machine.controller import Controller
 from .machine.states import PORTS
 from .motion.arm import CYCLE
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
-from .ports.client_interface import Publisher, ScriptPort, interpreter_reply
+from .ports.client_interface import ScriptPort, due_packets, greeting, interpreter_reply
 from .ports.dashboard import WELCOME, Dashboard
 from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
@@ -156,7 +156,6 @@ class Server:
         self.fault_address: tuple[str, int] | None = None
         self.local = True
         self._with_faults = faults
-        self._publisher = Publisher(controller)
         self._selector = selectors.SelectSelector()
         self._listeners: dict[str, socket.socket] = {}
         self._clients: dict[str, list[Client]] = {name: [] for name in (*PORTS, "faults")}
@@ -298,7 +297,7 @@ class Server:
 
     def _publish(self) -> None:
         listening = frozenset(name for name in _SCRIPT_PORTS if self._clients[name])
-        for name, (state, messages) in self._publisher.due(listening).items():
+        for name, (state, messages) in due_packets(self.controller, listening).items():
             for client in list(self._clients[name]) if name not in self._cut else ():
                 late = len(client.unsent)  # one that does not read misses states, and in the end messages too
                 self._send(name, client, (b"" if late else state) + (messages if late < MAX_MESSAGES else b""))
@@ -355,7 +354,7 @@ class Server:
         """Return what a new client of a service gets first."""
         if name == "dashboard" and not self.faults.dashboard_silent:
             return WELCOME.encode() + b"\n"
-        return self._publisher.greeting(name) if name in _SCRIPT_PORTS else b""
+        return greeting(self.controller, name) if name in _SCRIPT_PORTS else b""
 
     def _read(self, name: str, client: Client) -> None:
         if client not in self._clients[name] or name in self._cut:

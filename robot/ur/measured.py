@@ -27,23 +27,16 @@ _WATCHDOG_TIME = 0.25  # s; 1 / watchdog_hz, by default
 
 @dataclass(frozen=True, slots=True)
 class _MeasuredController:
-    """Times of one controller.
+    """Times of one controller."""
 
-    Attributes:
-        what: model, version and date.
-        start: p50 and p95 of a program's last byte to its first cycle [s].
-        watchdog: p50 and worst of the time from the end of a watchdog's period to the end of the program [s].
-        deceleration: of the leading joint, where a program is ended [rad/s2]; 0 where it was not measured.
-        stops: path, motion, speed [rad/s] and worst time until the arm stood [s], of each kind of stop of a joint.
-        slows: worst time until a stop by program or command showed [s]; 0 where none was measured.
-    """
-
-    what: str
-    start: tuple[float, float]
+    what: str  #: model, version and date
+    start: tuple[float, float]  #: p50 and p95 of a program's last byte to its first cycle [s]
+    #: p50 and worst of the time from the end of a watchdog's period to the end of the program [s]
     watchdog: tuple[float, float]
-    deceleration: float
+    deceleration: float  #: of the leading joint, where a program is ended [rad/s2]; 0 where it was not measured
+    #: path, motion, speed [rad/s] and worst time until the arm stood [s], of each kind of stop of a joint
     stops: tuple[tuple[str, str, float, float], ...]
-    slows: float
+    slows: float  #: worst time until a stop by program or command showed [s]; 0 where none was measured
 
 
 def read_measured(path: Path) -> _MeasuredController:

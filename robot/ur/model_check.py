@@ -25,17 +25,11 @@ _FLANGE_TOLERANCE = 0.01
 
 
 class _ArmPose(NamedTuple):
-    """Pose of an arm as its controller reports it.
+    """Pose of an arm as its controller reports it."""
 
-    Attributes:
-        q: joint positions [rad].
-        tcp: pose of the TCP in the base frame: x, y, z [m] and a rotation vector [rad].
-        offset: pose of the TCP in the flange's frame, likewise.
-    """
-
-    q: Joints
-    tcp: Joints
-    offset: Joints
+    q: Joints  #: joint positions [rad]
+    tcp: Joints  #: pose of the TCP in the base frame: x, y, z [m] and a rotation vector [rad]
+    offset: Joints  #: pose of the TCP in the flange's frame, likewise
 
 
 def read_pose(host: str, timeout: float = 2.0) -> _ArmPose | None:

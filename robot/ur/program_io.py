@@ -82,13 +82,7 @@ class RtdeVariableReader:
         """
         if name not in VARIABLES:
             raise RobotRefused(f"RTDE has no variable named {name}")
-        with self._asking:
-            names = self._recipe.names
-            if name not in names or self._thread is None:
-                self._end()
-                self._open(names if name in names else (*names, name))
-        recipe, payload = self._fresh()
-        return recipe.unpack(payload)[recipe.names.index(name)]
+        return self._values(name)[name]
 
     def reading(self) -> ArmReading:
         """Return what the controller says at one moment.
@@ -96,16 +90,21 @@ class RtdeVariableReader:
         Raises:
             RobotTimeout, RobotConnectionError: as ``value``.
         """
-        with self._asking:
-            if self._thread is None:
-                self._end()
-                self._open(self._recipe.names)
-        recipe, payload = self._fresh()
-        by_name: dict[str, Any] = dict(zip(recipe.names, recipe.unpack(payload), strict=True))
-        values = [by_name[name] for name in _READING_NAMES]
+        newest = self._values()
+        values: list[Any] = [newest[name] for name in _READING_NAMES]
         values[6:8] = _name(RobotMode, values[6]), _name(SafetyMode, values[7])
         values[9] = values[9] == PROGRAM_RUNNING
         return ArmReading._make((*values[:12], tuple(values[12:16]), tuple(values[16:])))
+
+    def _values(self, *wanted: str) -> dict[str, rtde.Value]:
+        """Return the newest values, over a new connection where the present one does not bring what is wanted."""
+        with self._asking:
+            names = self._recipe.names
+            if self._thread is None or not set(wanted) <= set(names):
+                self._end()
+                self._open((*names, *(name for name in wanted if name not in names)))
+        recipe, payload = self._fresh()
+        return dict(zip(recipe.names, recipe.unpack(payload), strict=True))
 
     def _open(self, names: tuple[str, ...]) -> None:
         connection = RtdeConnection(self._host, self._timeout, self._clock)

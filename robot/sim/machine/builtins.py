@@ -38,14 +38,10 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
     """All URScript functions, bound to one program of one controller."""
 
     @classmethod
-    def names(cls) -> frozenset[str]:
-        """Return the names of all functions."""
-        return frozenset(name for name in dir(cls) if not name.startswith("_") and name not in ("names", "blocking"))
-
-    @classmethod
-    def blocking(cls) -> frozenset[str]:
-        """Return the names of the functions that take time."""
-        return frozenset(name for name in cls.names() if isgeneratorfunction(getattr(cls, name)))
+    def functions(cls) -> dict[str, bool]:
+        """Return the names of all functions -> whether they take time."""
+        names = [name for name in dir(cls) if not name.startswith("_") and name != "functions"]
+        return {name: isgeneratorfunction(getattr(cls, name)) for name in names}
 
     # time and text
 

@@ -36,19 +36,12 @@ _FIELDBUS_INPUTS = (
 
 @dataclass(slots=True)
 class InputWatchdog:
-    """Watchdog that a client must feed by writing an input variable, as rtde_set_watchdog sets it.
+    """Watchdog that a client must feed by writing an input variable, as rtde_set_watchdog sets it."""
 
-    Attributes:
-        variable: name of the input.
-        period: longest time between two writes [s].
-        action: effect on the program when it expires: "pause", "stop" or "ignore".
-        fed: cycle of the last write.
-    """
-
-    variable: str
-    period: float
-    action: str
-    fed: int
+    variable: str  #: name of the input
+    period: float  #: longest time between two writes [s]
+    action: str  #: effect on the program when it expires: "pause", "stop" or "ignore"
+    fed: int  #: cycle of the last write
 
     def expired(self, cycle: int) -> bool:
         """Return whether the last write is too long ago at a cycle."""
@@ -63,6 +56,7 @@ class ClientInputs:
         fieldbus: an adapter on a fieldbus holds the lower half of the registers.
 
     Attributes:
+        values: name of an input -> its value.
         owners: name of an input -> the session that may write it.
         watchdogs: name of an input -> the watchdog on it.
         watchdog_delay: by which every watchdog is late [s].
@@ -72,8 +66,8 @@ class ClientInputs:
     def __init__(self, log: Callable[..., None], fieldbus: bool = False) -> None:
         self.owners: dict[str, object] = {}
         self.watchdogs: dict[str, InputWatchdog] = {}
-        self._values: dict[str, Value] = dict.fromkeys(INPUTS, 0)
-        self._values["external_force_torque"] = (0.0,) * 6
+        self.values: dict[str, Value] = dict.fromkeys(INPUTS, 0)
+        self.values["external_force_torque"] = (0.0,) * 6
         if fieldbus:
             self.owners.update(dict.fromkeys(_FIELDBUS_INPUTS, "fieldbus"))
         self.external_forces = False
@@ -81,17 +75,9 @@ class ClientInputs:
         self._log = log
         self._fresh = False  # a command register was written, and no program has read it
 
-    def __contains__(self, name: str) -> bool:
-        """Return whether there is an input of a name."""
-        return name in self._values
-
-    def __getitem__(self, name: str) -> Value:
-        """Return the value of an input."""
-        return self._values[name]
-
     def write(self, values: Mapping[str, Value], cycle: int) -> None:
         """Take the values of a client's data packet at a cycle, name -> value, in the order of its recipe."""
-        self._values.update(values)
+        self.values.update(values)
         for variable in self.watchdogs.keys() & values.keys():
             self.watchdogs[variable].fed = cycle
         for register in _COMMAND_REGISTERS:
@@ -103,7 +89,7 @@ class ClientInputs:
 
     def read_command(self, address: int) -> int:
         """Read an integer input register as a program does; log when it takes a command."""
-        value = int(self._values[f"input_int_register_{address}"])  # type: ignore[arg-type]
+        value = int(self.values[f"input_int_register_{address}"])  # type: ignore[arg-type]
         if self._fresh and address in (0, 24):
             self._fresh = False
             if value:
@@ -114,14 +100,14 @@ class ClientInputs:
         """Return force [N] and torque [N m] at the tool: those that a client gives instead of a sensor, or none."""
         if not self.external_forces:
             return (0.0,) * 6
-        return self._values["external_force_torque"]  # type: ignore[return-value]
+        return self.values["external_force_torque"]  # type: ignore[return-value]
 
     def read_bit(self, index: int) -> bool:
         """Return a boolean input register: 0 to 63 are the bits of two words."""
         if index >= 64:
-            return bool(self._values[f"input_bit_register_{index}"])
+            return bool(self.values[f"input_bit_register_{index}"])
         word = "input_bit_registers0_to_31" if index < 32 else "input_bit_registers32_to_63"
-        return bool(int(self._values[word]) >> index % 32 & 1)  # type: ignore[arg-type]
+        return bool(int(self.values[word]) >> index % 32 & 1)  # type: ignore[arg-type]
 
     def watch(self, variable: str, frequency: float, action: str, cycle: int) -> None:
         """Watch an input from a cycle on, as the script function rtde_set_watchdog does; 0 Hz ends it."""

@@ -100,7 +100,7 @@ class IoFunctions:
     def rtde_set_watchdog(self, variable_name: Any, min_frequency: float, action: Any = "pause") -> None:
         """Choose what happens when a client writes a variable too rarely."""
         name, wanted = str(variable_name), str(action).lower()
-        if name not in self._host.inputs or name not in VARIABLES:
+        if name not in self._host.inputs.values or name not in VARIABLES:
             raise ScriptError(f"rtde_set_watchdog: there is no input {name[:99]!r}")
         if wanted not in _INPUT_ACTION_NAMES:
             raise ScriptError(f"rtde_set_watchdog: an action is {', '.join(_INPUT_ACTION_NAMES)}, got {wanted[:99]!r}")
@@ -169,7 +169,7 @@ _TERMINAL_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "get_rtde_value": lambda host, name: host.rtde_value(str(name)),
     "read_input_integer_register": lambda host, address: host.inputs.read_command(index_of(address, _REGISTERS)),
     "read_input_float_register": lambda host, address: float(
-        host.inputs[f"input_double_register_{index_of(address, _REGISTERS)}"]
+        host.inputs.values[f"input_double_register_{index_of(address, _REGISTERS)}"]
     ),
     "read_input_boolean_register": lambda host, address: host.inputs.read_bit(index_of(address, _BITS)),
     "read_output_integer_register": lambda host, address: host.output_ints[index_of(address, _REGISTERS)],

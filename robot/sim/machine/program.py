@@ -82,12 +82,12 @@ class Program:
             "_method": self._call_method,
         }
         builtins = Builtins(host, self)
-        space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.names()}
+        space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.functions()}
         exec(marshal.loads(translation.code), space)  # the text was parsed, and nothing but its own names is in it
         self._translation = translation
         self._main = Thread("main", space["main"]())
         self.threads = [self._main]
-        self.interpreter = Interpreter(space, translation.names, Builtins.names(), Builtins.blocking())
+        self.interpreter = Interpreter(space, translation.names, Builtins.functions())
 
     @property
     def running(self) -> bool:

@@ -75,41 +75,29 @@ START_Q = (0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Kind of a simulated controller, and its deliberate deviations.
+    """Kind of a simulated controller, and its deliberate deviations."""
 
-    Attributes:
-        model: name of the arm.
-        version: of PolyScope, major and minor.
-        start_q: joint positions at the start [rad].
-        start_delay: from a program's last byte to its first cycle [s].
-        unlock_after: time that must pass before a protective stop can be unlocked [s].
-        after_protective_stop: effect of a protective stop on the program: paused (e-Series) or ended.
-        program: URScript that the dashboard's ``play`` starts.
-        programs: folder of the programs and installations that the dashboard can load.
-        external_control: host and port from which a program takes the script of its External Control node.
-        remote_control: whether the robot starts under remote control. In local control it takes no program, and no
-            command that changes anything.
-        remote_enabled: whether it has these at all; without, as URSim, it takes all, and says "not in remote control".
-        closed: services that are switched off, as all are on a robot that comes from the factory since 5.10.
-        watchdog_delay: by which the watchdog on an input is late [s].
-        deceleration: of the leading joint where nothing commands one, as in a pause; an assumption [rad/s^2].
-        fieldbus: an EtherNet/IP or PROFINET adapter holds the lower half of the input registers.
-    """
-
-    model: str = DEFAULT_MODEL
-    version: Version = (5, 25)
-    start_q: Sequence[float] = START_Q
-    start_delay: float = 0.010
-    unlock_after: float = 5.0
+    model: str = DEFAULT_MODEL  #: name of the arm
+    version: Version = (5, 25)  #: of PolyScope, major and minor
+    start_q: Sequence[float] = START_Q  #: joint positions at the start [rad]
+    start_delay: float = 0.010  #: from a program's last byte to its first cycle [s]
+    unlock_after: float = 5.0  #: time that must pass before a protective stop can be unlocked [s]
+    #: effect of a protective stop on the program: paused (e-Series) or ended
     after_protective_stop: Literal["pause", "stop"] = "pause"
-    program: str = ""
-    programs: Path | None = None
+    program: str = ""  #: URScript that the dashboard's ``play`` starts
+    programs: Path | None = None  #: folder of the programs and installations that the dashboard can load
+    #: host and port from which a program takes the script of its External Control node
     external_control: tuple[str, int] = ("127.0.0.1", 50002)
+    #: whether the robot starts under remote control. In local control it takes no program, and no command that changes
+    #: anything
     remote_control: bool = True
+    #: whether it has these at all; without, as URSim, it takes all, and says "not in remote control"
     remote_enabled: bool = True
+    #: services that are switched off, as all are on a robot that comes from the factory since 5.10
     closed: frozenset[str] = frozenset()
-    fieldbus: bool = False
-    watchdog_delay: float = 0.0
+    fieldbus: bool = False  #: an EtherNet/IP or PROFINET adapter holds the lower half of the input registers
+    watchdog_delay: float = 0.0  #: by which the watchdog on an input is late [s]
+    #: of the leading joint where nothing commands one, as in a pause; an assumption [rad/s^2]
     deceleration: float = 10.0
 
     @property

@@ -34,17 +34,11 @@ _JOINT_NAMES = ("Base", "Shoulder", "Elbow", "Wrist 1", "Wrist 2", "Wrist 3")
 
 @dataclass(frozen=True, slots=True)
 class StopCause:
-    """Cause of a protective stop.
+    """Cause of a protective stop."""
 
-    Attributes:
-        code: number after the C.
-        argument: number after the A.
-        title: that it has in the published list.
-    """
-
-    code: int
-    argument: int
-    title: str
+    code: int  #: number after the C
+    argument: int  #: number after the A
+    title: str  #: that it has in the published list
 
     def __str__(self) -> str:
         return f"C{self.code}A{self.argument}"
@@ -132,10 +126,11 @@ class SimulatedArm:
     """
 
     def __init__(self, model: ArmModel, q: Sequence[float]) -> None:
-        for i, (low, angle, high) in enumerate(zip(model.joint_lower, q, model.joint_upper, strict=True), 1):
+        for joint, (low, angle, high) in enumerate(zip(model.joint_lower, q, model.joint_upper, strict=True), 1):
             if not low <= angle <= high:
                 raise RobotRefused(
-                    f"start position of joint {i} must be in [{low:.3f}, {high:.3f}] rad, got {angle:.3f}"
+                    f"the start position of joint {joint} of the {model.name} must be from {math.degrees(low):g} to "
+                    f"{math.degrees(high):g} deg, got {math.degrees(angle):g} deg"
                 )
         self.model = model
         self.inertia = arm_inertia(model)

@@ -49,8 +49,8 @@ _MAX_TITLE_LENGTH = 255  # bytes: its length is one byte
 
 
 def _pack(kind: int, body: bytes) -> bytes:
-    """Return a packet of the client interface."""
-    return struct.pack(">iB", 5 + len(body), kind) + body
+    """Return a packet of the client interface, or a sub-package of a state."""
+    return struct.pack(">IB", 5 + len(body), kind) + body
 
 
 def _message(time: float, source: int, kind: int, body: bytes) -> bytes:
@@ -63,12 +63,7 @@ def _bytes(text: str) -> bytes:
 
 
 def _encode_version(time: float, version: Version) -> bytes:
-    """Return the message that a client of the primary interface gets first.
-
-    Args:
-        time: since power-on [s].
-        version: of the controller's software.
-    """
+    """Return the message that a client of the primary interface gets first, at a time since power-on [s]."""
     major, minor = version
     name, date = b"URControl", b"01-01-2026, 00:00:00"
     body = struct.pack(">B", len(name)) + name + struct.pack(">BBii", major, minor, 0, 1) + date
@@ -76,12 +71,7 @@ def _encode_version(time: float, version: Version) -> bytes:
 
 
 def _encode_notice(time: float, notice: Notice) -> bytes:
-    """Return a notice as a message.
-
-    Args:
-        time: since power-on [s].
-        notice: what has happened.
-    """
+    """Return a notice as a message, at a time since power-on [s]."""
     match notice:
         case TextNotice(text):
             return _message(time, _RUNTIME, _TEXT_MESSAGE, _bytes(text))
@@ -151,19 +141,11 @@ _BOX, _BOARD_VERSION = 4, 6  # of an e-Series control box, as recorded
 _DEFAULT_MOTION = (math.radians(60.0), math.radians(80.0), 0.25, 1.2, 0.25)  # joint and tool v and a, and their radius
 
 
-def _encode_state(controller: Controller) -> bytes:
-    """Return the packet of the present state."""
-    return _pack(ROBOT_STATE, b"".join(_changing(controller)))
-
-
-def _encode_first_state(controller: Controller) -> bytes:
-    """Return the packet of the present state, with kinematics and configuration: what a new client gets first."""
+def _encode_state(controller: Controller, *, first: bool = False) -> bytes:
+    """Return the packet of the present state; a new client first gets it with kinematics and configuration."""
     model, version = controller.arm.model, controller.options.version
-    return _pack(ROBOT_STATE, b"".join((*_changing(controller), _kinematics(model), _configuration(model, version[0]))))
-
-
-def _sub(kind: int, body: bytes) -> bytes:
-    return struct.pack(">IB", 5 + len(body), kind) + body
+    fixed = (_kinematics(model), _configuration(model, version[0])) if first else ()
+    return _pack(ROBOT_STATE, b"".join((*_changing(controller), *fixed)))
 
 
 def _changing(c: Controller) -> Iterable[bytes]:
@@ -176,34 +158,34 @@ def _changing(c: Controller) -> Iterable[bytes]:
     time = round(c.timestamp * 1e6)
     mode = struct.pack(">Q7BBBddd", time, *flags, c.robot_mode, _CONTROL_MODE_POSITION, c.slider, scaling, 1.0)
     last = b"" if c.options.version[0] == 3 else bytes(1)  # a byte that CB3 does not have, here and below
-    yield _sub(_MODE, mode + last)
+    yield _pack(_MODE, mode + last)
     of_joint = {RobotMode.RUNNING: _JOINT_RUNNING, RobotMode.IDLE: _JOINT_IDLE}.get(c.robot_mode, _JOINT_OFF)
     joints = (
         struct.pack(">dddffffB", q, target, qd, current, 48.0 * powered, 30.0, 0.0, of_joint)
         for q, target, qd, current in zip(arm.measured.q, arm.q, arm.measured.qd, c.currents, strict=True)
     )
-    yield _sub(_JOINTS, b"".join(joints))
-    yield _sub(_TOOL, struct.pack(">BBddfBffB", 1, 1, 0.0, 0.0, 0.0, 0, 0.0, 30.0, _TOOL_RUNNING))
+    yield _pack(_JOINTS, b"".join(joints))
+    yield _pack(_TOOL, struct.pack(">BBddfBffB", 1, 1, 0.0, 0.0, 0.0, 0, 0.0, 30.0, _TOOL_RUNNING))
     t = c.terminals
     inputs = struct.pack(">IIBBdd", t.digital_inputs, c.digital_outputs, *t.input_domains[:2], *t.analog_inputs[:2])
     outputs = struct.pack(">BBdd", *t.output_domains, *map(t.analog_output, (0, 1)))
     rest = struct.pack(">ffffBBBIBB", 30.0, 48.0, 0.5, 0.1, c.safety, 0, 0, 0, 1, 1) + bytes(1)
-    yield _sub(_BOARD, inputs + outputs + rest)
-    yield _sub(_CARTESIAN, struct.pack(">12d", *values_of(arm.tcp_pose(arm.measured.q)), *values_of(arm.tcp)))
-    yield _sub(_FORCES, bytes(56))
-    yield _sub(_ADDITIONAL, struct.pack(">BBB", 0, 1, 0) + last)
-    yield _sub(_CALIBRATION, bytes(48))
-    yield _sub(_SAFETY, bytes(38))  # "used by Universal Robots software only"
+    yield _pack(_BOARD, inputs + outputs + rest)
+    yield _pack(_CARTESIAN, struct.pack(">12d", *values_of(arm.tcp_pose(arm.measured.q)), *values_of(arm.tcp)))
+    yield _pack(_FORCES, bytes(56))
+    yield _pack(_ADDITIONAL, struct.pack(">BBB", 0, 1, 0) + last)
+    yield _pack(_CALIBRATION, bytes(48))
+    yield _pack(_SAFETY, bytes(38))  # "used by Universal Robots software only"
     if not last:
         return  # a tool without an interface
-    yield _sub(_TOOL_LINE, struct.pack(">?iiiff", False, 115200, 0, 1, 1.5, 3.5))
-    yield _sub(_TOOL_OUTPUTS, struct.pack(">BBB", 0, 1, 1))
+    yield _pack(_TOOL_LINE, struct.pack(">?iiiff", False, 115200, 0, 1, 1.5, 3.5))
+    yield _pack(_TOOL_OUTPUTS, struct.pack(">BBB", 0, 1, 1))
 
 
 def _kinematics(model: ArmModel) -> bytes:
     table = struct.pack(">24d", *model.theta, *model.a, *model.d, *model.alpha)
     checksum = (zlib.crc32(table[8 * i :: 48]) for i in range(6))  # one for each joint
-    return _sub(_KINEMATICS, struct.pack(">6I", *checksum) + table + struct.pack(">I", 0))
+    return _pack(_KINEMATICS, struct.pack(">6I", *checksum) + table + struct.pack(">I", 0))
 
 
 def _configuration(model: ArmModel, major: int) -> bytes:
@@ -214,47 +196,42 @@ def _configuration(model: ArmModel, major: int) -> bytes:
     numbers = struct.pack(">53d", *limits, *motion, *_DEFAULT_MOTION, *table)
     size = _ROBOT_TYPES.get(model.name.removesuffix("e"), 0)
     box = struct.pack(">iiii", _BOARD_VERSION, _BOX, size, _ROBOT_SUBTYPES.get(major, 3))
-    return _sub(_CONFIGURATION, numbers + box)
+    return _pack(_CONFIGURATION, numbers + box)
 
 
 _STATE_CYCLES = 50  # between two states of primary and secondary interface: 10 Hz
 _READ_ONLY = 210  # number of the error of a connection that takes no program
 
 
-class Publisher:
-    """What the client interfaces send of one controller: each packet once for all its clients."""
+def greeting(controller: Controller, name: str) -> bytes:
+    """Return what a new client of a port gets first."""
+    if name == "realtime":
+        return b""
+    return _encode_version(controller.timestamp, controller.options.version) + _encode_state(controller, first=True)
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
 
-    def greeting(self, name: str) -> bytes:
-        """Return what a new client of a port gets first."""
-        c = self._controller
-        if name == "realtime":
-            return b""
-        return _encode_version(c.timestamp, c.options.version) + _encode_first_state(c)
+def due_packets(controller: Controller, listening: frozenset[str]) -> dict[str, tuple[bytes, bytes]]:
+    """Return what is due in this cycle: port -> state and messages for each of its clients.
 
-    def due(self, listening: frozenset[str]) -> dict[str, tuple[bytes, bytes]]:
-        """Return what is due in this cycle: port -> state and messages for each of its clients.
+    A state is worth nothing once there is a newer one; a message is sent once.
 
-        A state is worth nothing once there is a newer one; a message is sent once.
-
-        Args:
-            listening: ports that have clients; for the others nothing is made.
-        """
-        c = self._controller
-        states: dict[str, bytes] = {}
-        notices = [c.notices.popleft() for _ in range(len(c.notices))]
-        changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
-        if (changed or c.cycle % _STATE_CYCLES == 0) and listening & {"primary", "secondary"}:
-            states |= dict.fromkeys(listening & {"primary", "secondary"}, _encode_state(c))
-        if "realtime" in listening and c.cycle % c.options.steps == 0:
-            states["realtime"] = _encode_realtime(c)
-        due = {name: (state, b"") for name, state in states.items()}
-        if "primary" in listening and notices:
-            messages = b"".join([_encode_notice(c.timestamp, notice) for notice in notices])
-            due["primary"] = (states.get("primary", b""), messages)
-        return due
+    Args:
+        controller: whose notices are taken.
+        listening: ports that have clients; for the others nothing is made.
+    """
+    c = controller
+    states: dict[str, bytes] = {}
+    notices = [c.notices.popleft() for _ in range(len(c.notices))]
+    changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
+    if (changed or c.cycle % _STATE_CYCLES == 0) and (ports := listening & {"primary", "secondary"}):
+        states = dict.fromkeys(ports, _encode_state(c))
+    if "realtime" in listening and c.cycle % c.options.steps == 0:
+        states["realtime"] = _encode_realtime(c)
+    due = {name: (state, b"") for name, state in states.items()}
+    if "primary" in listening and notices:
+        messages = b"".join([_encode_notice(c.timestamp, notice) for notice in notices])
+        due["primary"] = (states.get("primary", b""), messages)
+    return due
 
 
 #: line of a client -> what the controller does

@@ -37,7 +37,6 @@ _OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 _NO_VERSION = None
 #: command -> first minor version of PolyScope 5 that has it, and of CB3; all others have it since 5.0 and 3.0
 _FIRST_VERSIONS: dict[str, tuple[int | None, int | None]] = {
-    "addToLog": (0, 0),
     "clear operational mode": (0, _NO_VERSION),
     "generate flight report": (8, 13),
     "generate support file": (8, 13),
@@ -108,11 +107,6 @@ class Dashboard:
         }
         for name in POWER_COMMANDS:
             self._commands[name] = lambda _, command=name: self._c.switch_power(command)  # type: ignore[misc]
-
-    @property
-    def commands(self) -> list[str]:
-        """All commands, those of other versions too."""
-        return sorted(self._commands, key=str.lower)
 
     def answer(self, line: str) -> str:
         """Act on one line of the client, without its newline; return the reply, likewise."""

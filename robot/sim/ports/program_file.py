@@ -20,17 +20,11 @@ EXTERNAL_CONTROL = "# script of the node External Control"
 
 @dataclass(frozen=True, slots=True)
 class ProgramFile:
-    """Program that is loaded.
+    """Program that is loaded."""
 
-    Attributes:
-        name: of its file, with the extension.
-        path: of its file, as PolyScope gives it.
-        text: its URScript, from ``def`` to ``end``.
-    """
-
-    name: str
-    path: str
-    text: str
+    name: str  #: of its file, with the extension
+    path: str  #: of its file, as PolyScope gives it
+    text: str  #: its URScript, from ``def`` to ``end``
 
     @property
     def takes_external_script(self) -> bool:

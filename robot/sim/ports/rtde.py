@@ -132,11 +132,6 @@ class RtdeOutputs:
             "payload_inertia": lambda: c.payload_inertia,
         }
 
-    @property
-    def simulated(self) -> frozenset[str]:
-        """Names of the outputs that follow the arm, the programs or the clients; registers apart, the others stay."""
-        return frozenset(self._getters)
-
     def getter(self, name: str) -> Callable[[], Value | Sequence[float]]:
         """Return a function that returns the present value of an output."""
         c = self._c
@@ -152,8 +147,8 @@ class RtdeOutputs:
         if register in registers:
             values, index = registers[register], int(digits)
             return lambda: values[index]
-        if name in c.inputs and name.startswith("input_"):
-            return lambda: c.inputs[name]
+        if name in c.inputs.values and name.startswith("input_"):
+            return lambda: c.inputs.values[name]
         kind = VARIABLES[name]
         zero: Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
         constant = _CONSTANT_OUTPUTS.get(name, zero)
@@ -296,7 +291,7 @@ class RtdeSession:
         names, owners = split_names(payload), self._c.inputs.owners
         types = []
         for name in names:
-            if name not in self._c.inputs:
+            if name not in self._c.inputs.values:
                 types.append(NOT_FOUND)
             else:
                 types.append(VARIABLES[name] if owners.get(name, self) is self else IN_USE)

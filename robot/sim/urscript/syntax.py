@@ -7,26 +7,19 @@ start of the next line, and interpreter mode has whole functions in one line: bo
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Set
+from collections.abc import Callable, Mapping, Set
 from typing import NamedTuple
 
 from .values import CHANGING_METHODS, MAX_ITEMS, ScriptError
 
 
 class _Token(NamedTuple):
-    """Word, number, text or sign of a program.
+    """Word, number, text or sign of a program."""
 
-    Attributes:
-        kind: "name", "number", "string", "sign", or "end" after the last one.
-        text: as it is written.
-        line: number of its line, from 1.
-        first: True for the first one of its line.
-    """
-
-    kind: str
-    text: str
-    line: int
-    first: bool
+    kind: str  #: "name", "number", "string", "sign", or "end" after the last one
+    text: str  #: as it is written
+    line: int  #: number of its line, from 1
+    first: bool  #: True for the first one of its line
 
 
 #: next token, after any blanks
@@ -93,13 +86,12 @@ class ExpressionParser:
     Args:
         text: of the program.
         functions: names of its own functions.
-        builtins: names of the controller's functions.
-        blocking: those of them that take time, and are therefore generators.
+        builtins: names of the controller's functions -> whether they take time, and are therefore generators.
     """
 
-    def __init__(self, text: str, functions: Set[str], builtins: Set[str], blocking: Set[str]) -> None:
+    def __init__(self, text: str, functions: Set[str], builtins: Mapping[str, bool]) -> None:
         self._text = text
-        self._functions, self._builtins, self._blocking = functions, builtins, blocking
+        self._functions, self._builtins = functions, builtins
         self._tokens = _tokens_of(text)
         self._at = self._depth = self._brackets = 0
 
@@ -249,7 +241,7 @@ class ExpressionParser:
         own = text in self._functions
         name = self._python_name(text, line)
         arguments = self._inside(lambda: self._items(named="v_{}=" if own else "{}="))
-        return f"(yield from {name}({arguments}))" if own or text in self._blocking else f"{name}({arguments})"
+        return f"(yield from {name}({arguments}))" if own or self._builtins[text] else f"{name}({arguments})"
 
     def _python_name(self, name: str, line: int) -> str:
         """Return the Python name of a function.

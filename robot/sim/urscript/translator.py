@@ -21,7 +21,7 @@ from __future__ import annotations
 import marshal
 import re
 from collections import deque
-from collections.abc import Generator, Set
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -39,36 +39,22 @@ _QUOTED_TEXT_AND_COMMENT = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names that a program has: interpreter mode goes on with them.
+    """Names that a program has: interpreter mode goes on with them."""
 
-    Attributes:
-        functions: that it defines.
-        shared: variables that all of its functions see.
-    """
-
-    functions: frozenset[str] = frozenset()
-    shared: frozenset[str] = frozenset()
+    functions: frozenset[str] = frozenset()  #: that it defines
+    shared: frozenset[str] = frozenset()  #: variables that all of its functions see
 
 
 @dataclass(frozen=True, slots=True)
 class Translation:
-    """Program that is ready to run.
+    """Program that is ready to run."""
 
-    Attributes:
-        name: name in the program's text.
-        secondary: True for a ``sec`` program, which runs beside the main one and cannot move the arm.
-        code: marshalled Python module that defines ``main``, a generator function, and the functions that it uses.
-        text: of the program.
-        lines: line of the program for each line of the module.
-        names: what it defines.
-    """
-
-    name: str
-    secondary: bool
-    code: bytes
-    text: str
-    lines: tuple[int, ...]
-    names: Names
+    name: str  #: name in the program's text
+    secondary: bool  #: True for a ``sec`` program, which runs beside the main one and cannot move the arm
+    code: bytes  #: marshalled Python module that defines ``main``, a generator function, and the functions that it uses
+    text: str  #: of the program
+    lines: tuple[int, ...]  #: line of the program for each line of the module
+    names: Names  #: what it defines
 
     def located(self, problem: Exception) -> ScriptError:
         """Return what went wrong while it ran as an error that names the line of the program."""
@@ -114,13 +100,12 @@ def complete_programs(text: str) -> tuple[list[str], str]:
     return programs, text[start:]
 
 
-def translate(text: str, builtins: Set[str], blocking: Set[str], names: Names | None = None) -> Translation:
+def translate(text: str, builtins: Mapping[str, bool], names: Names | None = None) -> Translation:
     """Turn one program into a Python module.
 
     Args:
         text: from ``def name():`` or ``sec name():`` to ``end``, or statements by themselves.
-        builtins: names of the controller's functions.
-        blocking: those of them that take time, and are therefore generators.
+        builtins: names of the controller's functions -> whether they take time, and are therefore generators.
         names: those of the program that these statements become a part of; none for a program of its own.
 
     Raises:
@@ -129,7 +114,7 @@ def translate(text: str, builtins: Set[str], blocking: Set[str], names: Names | 
     if len(text) > MAX_LENGTH:
         raise ScriptError(f"a program has at most {MAX_LENGTH} characters, got {len(text)}")
     try:
-        return _Translator(text, builtins, blocking, names).translation()
+        return _Translator(text, builtins, names).translation()
     except ScriptError:
         raise
     except Exception as exc:  # of Python's own compiler, whose limits are not ours: too deep, too many, misplaced
@@ -169,9 +154,9 @@ class _Function:
 class _Translator(ExpressionParser):
     """Translator of one text."""
 
-    def __init__(self, text: str, builtins: Set[str], blocking: Set[str], names: Names | None) -> None:
+    def __init__(self, text: str, builtins: Mapping[str, bool], names: Names | None) -> None:
         self._known = Names() if names is None else names
-        super().__init__(text, set(), builtins, blocking)
+        super().__init__(text, set(), builtins)
         pairs = list(pairwise(self._tokens))
         defined = [name.text for word, name in pairs if word.text in _FUNCTION_KINDS and name.kind == "name"]
         if len(defined) > _MAX_FUNCTIONS:
@@ -402,8 +387,7 @@ class Interpreter:
     Args:
         space: the program's names, with what they stand for.
         names: what the program defines.
-        builtins: names of the controller's functions.
-        blocking: those of them that take time.
+        builtins: names of the controller's functions -> whether they take time.
 
     Attributes:
         executed: number of the last statement that has begun; 0 before the first.
@@ -412,9 +396,9 @@ class Interpreter:
         aborts: True from a command to abort the present motion until that has been done.
     """
 
-    def __init__(self, space: dict[str, Any], names: Names, builtins: Set[str], blocking: Set[str]) -> None:
+    def __init__(self, space: dict[str, Any], names: Names, builtins: Mapping[str, bool]) -> None:
         self._space, self._of_program, self._names = space, names, names
-        self._builtins, self._blocking = builtins, blocking
+        self._builtins = builtins
         self._queue: deque[tuple[int, Translation]] = deque()
         self._active = False
         self.executed = self.interpreted = self.cleared = 0
@@ -436,7 +420,7 @@ class Interpreter:
                 f"a line has at most {_MAX_LINE_LENGTH} characters, and one interpreter mode {_MAX_STATEMENTS} lines; "
                 "clear_interpreter() makes room"
             )
-        made = translate(line, self._builtins, self._blocking, self._names)
+        made = translate(line, self._builtins, self._names)
         self._names = Names(made.names.functions, self._names.shared)
         self.interpreted += 1
         self._queue.append((self.interpreted, made))

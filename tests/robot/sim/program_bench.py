@@ -25,7 +25,7 @@ class Bench:
         self.dashboard = Dashboard(UserInterface(self.controller, self.send)).answer
 
     def send(self, text: str) -> None:
-        made = translate(text, Builtins.names(), Builtins.blocking())
+        made = translate(text, Builtins.functions())
         if not made.secondary:
             self.controller.program_arrived()
         self.controller.load(made)

@@ -172,7 +172,7 @@ def test_a_taken_port_is_one_line_that_names_it(capfd: pytest.CaptureFixture[str
         (["--version", "five"], "--version must be MAJOR.MINOR such as 5.25, got 'five'"),
         (
             ["--start-q-deg", "0", "0", "200", "0", "0", "0"],
-            "--start-q-deg: joint 3 of the UR5e must be from -180 to 180 deg, got 200 deg",
+            "the start position of joint 3 of the UR5e must be from -180 to 180 deg, got 200 deg",
         ),
         (
             ["--start-q-deg", "0", "nan", "0", "0", "0", "0"],

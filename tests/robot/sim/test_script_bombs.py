@@ -134,7 +134,7 @@ class Watched:
         programs, _ = complete_programs(text)
         for text in programs:
             try:
-                made = translate(text, Builtins.names(), Builtins.blocking())
+                made = translate(text, Builtins.functions())
             except ScriptError as exc:
                 return str(exc)
             if not made.secondary:

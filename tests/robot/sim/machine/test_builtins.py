@@ -30,7 +30,7 @@ def test_the_example_of_each_function_holds(name: str) -> None:
     body = [*before, f"if {last}:", "write_output_integer_register(0, 1)", "end"]
     controller = Controller(Options(start_delay=0.0, start_q=HOME))
     RtdeOutputs(controller)  # whose values a program reads
-    controller.load(translate("def p():\n" + "\n".join(body) + "\nend\n", Builtins.names(), Builtins.blocking()))
+    controller.load(translate("def p():\n" + "\n".join(body) + "\nend\n", Builtins.functions()))
     controller.update()
     for _ in range(3000):
         controller.update()
@@ -59,7 +59,7 @@ def test_the_dynamics_of_the_bare_arm_are_those_of_pinocchio(rotors: bool) -> No
 end
 """
     controller = Controller(Options(model="UR10e", start_delay=0.0, start_q=HOME))
-    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    controller.load(translate(text, Builtins.functions()))
     for _ in range(20):
         controller.update()
     arm, inertia = arm_model("UR10e"), arm_inertia("UR10e")
@@ -70,7 +70,7 @@ end
 
 
 def test_every_function_has_an_example() -> None:
-    assert set(_ALL) == Builtins.names()
+    assert set(_ALL) == set(Builtins.functions())
     assert set(_ALL) >= NO_EFFECT
 
 
@@ -100,7 +100,7 @@ def test_what_no_controller_takes_ends_the_program(example: str, words: str) -> 
     controller = Controller(Options(start_delay=0.0))
     failed: list[str] = []
     controller.fail = lambda _, problem: failed.append(str(problem))  # type: ignore[method-assign]
-    controller.load(translate(f"def p():\n{example}\nend\n", Builtins.names(), Builtins.blocking()))
+    controller.load(translate(f"def p():\n{example}\nend\n", Builtins.functions()))
     for _ in range(6):
         controller.update()
     assert words in failed[0]
@@ -119,7 +119,7 @@ def test_what_no_controller_takes_ends_the_program(example: str, words: str) -> 
 def test_what_is_not_there_is_told_once_and_moves_nothing(call: str) -> None:
     controller = Controller(Options(start_delay=0.0))
     text = f"def p():\n  while True:\n    {call}\n    sync()\n  end\nend\n"
-    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    controller.load(translate(text, Builtins.functions()))
     for _ in range(20):
         controller.update()
     assert ["not simulated" in str(notice) for notice in controller.notices].count(True) == 1
@@ -158,7 +158,7 @@ def test_what_polyscope_writes_before_a_program_is_taken_and_clients_are_told_th
   end
 end
 """
-    controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+    controller.load(translate(text, Builtins.functions()))
     for _ in range(30):
         controller.update()
     assert controller.program is not None

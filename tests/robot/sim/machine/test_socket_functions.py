@@ -30,7 +30,7 @@ class Peer:
     def run(self, body: str) -> socket.socket:
         port = self.listener.getsockname()[1]
         text = f'def p():\nif socket_open("127.0.0.1", {port}, "peer"):\n{body}\nend\nend\n'
-        self.controller.load(translate(text, Builtins.names(), Builtins.blocking()))
+        self.controller.load(translate(text, Builtins.functions()))
         self.step(3)
         self.socket, _ = self.listener.accept()
         self.socket.settimeout(PATIENCE)

@@ -32,7 +32,7 @@ class Console:
         self.dashboard = Dashboard(self.interface)
 
     def translate(self, text: str) -> Translation:
-        return translate(text, Builtins.names(), Builtins.blocking())
+        return translate(text, Builtins.functions())
 
     def run(self, text: str) -> None:
         self.controller.program_arrived()

@@ -19,7 +19,6 @@ from coneskin.robot.sim.machine.states import (
 )
 from coneskin.robot.sim.ports.client_interface import (
     ScriptPort,
-    _encode_first_state,
     _encode_notice,
     _encode_realtime,
     _encode_state,
@@ -117,7 +116,7 @@ def sub_packages(packet):
 
 
 def test_the_first_state_has_every_sub_package_in_its_recorded_size():
-    packet = _encode_first_state(Controller(Options(model="ur5e")))
+    packet = _encode_state(Controller(Options(model="ur5e")), first=True)
     assert {kind: len(body) + 5 for kind, body in sub_packages(packet).items()} == RECORDED
     assert len(packet) == 1386
 
@@ -155,13 +154,13 @@ def test_it_says_where_the_arm_is_and_what_it_does():
 def test_the_arm_is_named_as_recorded():
     """Type 1 of sub-type 3 is the recorded UR5e; its table is there too."""
     controller = Controller(Options(model="ur5e"))
-    state = sub_packages(_encode_first_state(controller))
+    state = sub_packages(_encode_state(controller, first=True))
     numbers = struct.unpack(">53diiii", state[6])
     assert numbers[-4:] == (6, 4, 1, 3)
     assert numbers[29:35] == (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
     assert struct.unpack(">24d", state[5][24:216])[6:12] == (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
     for name, number in {"ur3e": 3, "ur10": 2, "ur16e": 4, "ur8 long": 6, "ur20": 7}.items():
-        state = sub_packages(_encode_first_state(Controller(Options(model=name))))
+        state = sub_packages(_encode_state(Controller(Options(model=name)), first=True))
         assert struct.unpack(">ii", state[6][-8:]) == (number, 3)
 
 

@@ -184,7 +184,7 @@ def first_version(command: str, major: int) -> str:
 def page_table() -> str:
     """The page's list of commands by the first versions of e-Series and of CB3 that have them."""
     groups: dict[tuple[str, str], list[str]] = {}
-    for command in Console().dashboard.commands:
+    for command in sorted(Console().dashboard._commands, key=str.lower):
         groups.setdefault((first_version(command, 5) or "-", first_version(command, 3) or "-"), []).append(command)
     lines = ["|e-Series since|CB3 since|dashboard commands|", "|---|---|---|"]
     lines += [f"|{new}|{old}|{', '.join(f'`{one}`' for one in groups[new, old])}|" for new, old in sorted(groups)]
@@ -199,7 +199,7 @@ def test_the_page_lists_every_command() -> None:
 
 def test_every_command_of_the_page_is_understood_by_a_version_that_has_it() -> None:
     for version in ((5, 25), (3, 15)):
-        for command in Console(version=version).dashboard.commands:
+        for command in Console(version=version).dashboard._commands:
             said = Console(version=version).say(command)
             assert said.startswith("could not understand") is not available(command, version), (command, version, said)
 

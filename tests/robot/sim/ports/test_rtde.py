@@ -108,7 +108,7 @@ def test_input_recipes_are_numbered_and_kept_after_the_client() -> None:
     assert ask(connection, pack_inputs_request(both)) == b"\x02INT32,DOUBLE"
     write(connection, 2, both, (7, 2.5))
     connection.close()
-    assert [controller.inputs[name] for name in both] == [7, 2.5]
+    assert [controller.inputs.values[name] for name in both] == [7, 2.5]
     assert ask(session(controller), pack_inputs_request(both)) == b"\x01INT32,DOUBLE"  # numbers are the connection's
 
 
@@ -163,7 +163,7 @@ def test_a_packet_that_is_too_long_is_truncated_and_logged() -> None:
     connection = session(controller)
     ask(connection, pack_inputs_request(("input_int_register_0",)))
     connection.receive(pack(PacketKind.DATA, struct.pack(">Bid", 1, 5, 1.0)))
-    assert controller.inputs["input_int_register_0"] == 5
+    assert controller.inputs.values["input_int_register_0"] == 5
     assert "recipe 1 has 5 bytes, got 13" in log.getvalue()
 
 
@@ -177,7 +177,7 @@ def test_noise_and_packets_of_no_recipe_change_nothing() -> None:
 
 def page_table() -> str:
     """The page's list of variables, as the controller has them; 0 to 47 stands for registers of these numbers."""
-    simulated = RtdeOutputs(Controller(Options())).simulated
+    simulated = RtdeOutputs(Controller(Options()))._getters
     names = [name for name in VARIABLES if "_register" not in name]
     outputs = [name for name in names if available(name, (5, 25))]
     groups = {

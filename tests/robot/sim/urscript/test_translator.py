@@ -15,7 +15,7 @@ from tests.robot.sim.program_bench import Bench
 
 
 def compiled(text: str) -> Translation:
-    return translate(text, Builtins.names(), Builtins.blocking())
+    return translate(text, Builtins.functions())
 
 
 def started(text: str) -> Controller:
