@@ -20,7 +20,6 @@ HEAVY = NUMERIC | DEVICES | DRAWING | PAGE | ENGINE
 VIRTUAL = {
     "coneskin.skin.virtual.skin",
     "coneskin.skin.virtual.circuit",
-    "coneskin.skin.virtual.ladder",
     "coneskin.skin.virtual.pseudo_terminal",
 }
 FIELD = {"coneskin.skin.field", "coneskin.skin.virtual.field_contacts"}

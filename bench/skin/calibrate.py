@@ -27,9 +27,8 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder
 from coneskin.skin.virtual.imperfections import Imperfections
-from coneskin.skin.virtual.ladder import ResistorLadder
 from coneskin.skin.virtual.skin import VirtualSkin
 
 FOREARM_CONE = Frustum(0.0375, 0.0375, 0.24, math.radians(350.0))

@@ -2,13 +2,15 @@
 
 Two sheets and any contacts between them are one reciprocal linear network with four terminals, I = Y V in the order
 A, B, C, D. Where Y comes from (ideal resistors, or the exact field) is the business of a ``ContactModel``; the supply,
-the leads, the pull-downs, broken wires and shorts are the same for each and are here.
+the leads, the pull-downs, broken wires and shorts are the same for each and are here, with the quickest model: ladders
+of ideal resistors.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
 from coneskin.core.errors import SensorError
@@ -17,7 +19,7 @@ from coneskin.skin.wire import DrivenPotentials, Frame
 
 Matrix = tuple[tuple[float, ...], ...]
 _A, _B, _C, _D = range(4)
-_TERMINAL_NAMES = "ABCD"
+RIGHT_WIRES = "ABCD"  #: electrodes on the terminals A, B, C, D
 _RAIL_NAMES = ("ground", "supply", "rail")
 _SHORT_CONDUCTANCE = 10.0  # S; a solid metallic short, 0.1 ohm
 
@@ -65,12 +67,10 @@ class WiringFaults:
 
     def __post_init__(self) -> None:
         for name in self.opened:
-            if name not in tuple(_TERMINAL_NAMES):
+            if name not in tuple(RIGHT_WIRES):
                 raise SensorError(f"an open wire must be one of A, B, C, D, got {name!r}")
         for pair in self.shorts:
-            if not (
-                len(pair) == 2 and pair[0] in tuple(_TERMINAL_NAMES) and pair[1] in (*_TERMINAL_NAMES, *_RAIL_NAMES)
-            ):
+            if not (len(pair) == 2 and pair[0] in tuple(RIGHT_WIRES) and pair[1] in (*RIGHT_WIRES, *_RAIL_NAMES)):
                 raise SensorError(
                     "a short must join one of A, B, C, D with another of them, with ground, supply or rail, "
                     f"got {'-'.join(pair)!r}"
@@ -143,13 +143,13 @@ def _phase(
     loads = {"pulldown": parts.pulldown_ohms, "input": parts.input_ohms, "supply": 0.0, "ground": 0.0}
     feeds = [0.0] * 4
     for k, terminal in enumerate(terminals):
-        feeds[k] = 0.0 if _TERMINAL_NAMES[k] in wiring.opened else 1.0 / (parts.lead_ohms[k] + loads[terminal])
+        feeds[k] = 0.0 if RIGHT_WIRES[k] in wiring.opened else 1.0 / (parts.lead_ohms[k] + loads[terminal])
         matrix[k][k] += feeds[k] + 1e-15  # keeps a sheet that has lost all of its wires at ground
         sources[k] += feeds[k] * parts.supply_volts if terminal == "supply" else 0.0
     for first, second in wiring.shorts:
-        j = _TERMINAL_NAMES.index(first)
-        if second in _TERMINAL_NAMES:
-            join(matrix, j, _TERMINAL_NAMES.index(second), _SHORT_CONDUCTANCE)
+        j = RIGHT_WIRES.index(first)
+        if second in RIGHT_WIRES:
+            join(matrix, j, RIGHT_WIRES.index(second), _SHORT_CONDUCTANCE)
         else:
             matrix[j][j] += _SHORT_CONDUCTANCE
             sources[j] += 0.0 if second == "ground" else _SHORT_CONDUCTANCE * parts.supply_volts
@@ -158,7 +158,7 @@ def _phase(
         (parts.supply_volts - at[k]) * feeds[k] for k, terminal in enumerate(terminals) if terminal == "supply"
     )
     current += sum(
-        (parts.supply_volts - at[_TERMINAL_NAMES.index(first)]) * _SHORT_CONDUCTANCE
+        (parts.supply_volts - at[RIGHT_WIRES.index(first)]) * _SHORT_CONDUCTANCE
         for first, second in wiring.shorts
         if second == "rail"
     )
@@ -212,3 +212,96 @@ def counts_of(frame: Frame) -> dict[str, int]:
     """Return the readings that a frame carries."""
     counts = {name: getattr(frame, name) for name in _COMMON_NAMES}
     return counts if frame.driven is None else counts | frame.driven._asdict()
+
+
+_MIN_PART = 1e-6  # part of a sheet between two nodes, so that nodes may coincide
+
+
+class ResistorLadder:
+    """Contact model of ideal series and parallel resistors.
+
+    Each contact divides the upper sheet at its radial fraction and the lower sheet at its angular fraction into
+    resistors in series, and joins the two at these nodes. Current that spreads sideways around a small contact is left
+    out; the resistance of that spreading counts as part of the contact's own.
+    """
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return the matrix of each scene; see ``admittance``."""
+        return [self.admittance(sensor, contacts) for contacts in scenes]
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Do nothing: nothing takes long here."""
+
+    def admittance(self, sensor: Sensor, contacts: Sequence[LayerContact]) -> Matrix:
+        """Return the 4 x 4 matrix Y [S] in the order A, B, C, D: symmetric, its rows sum to zero.
+
+        Raises:
+            SensorError: a contact lies off the sensor, or its conductance is negative.
+        """
+        size = 4 + 2 * len(contacts)
+        y = [[0.0] * size for _ in range(size)]
+        along = [(0.0, _B), (1.0, _A)]
+        around = [(0.0, _D), (1.0, _C)]
+        cone = sensor.frustum
+        for k, contact in enumerate(contacts):
+            if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
+                raise SensorError(
+                    f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] "
+                    f"rad, got {contact.u!r} m and {contact.phi!r} rad"
+                )
+            if not contact.conductance >= 0.0:
+                raise SensorError(f"contact.conductance must not be negative, got {contact.conductance!r} S")
+            radial, angular = sensor.fractions(contact.u, contact.phi)
+            upper, lower = 4 + 2 * k, 5 + 2 * k
+            along.append((1.0 - radial if sensor.b_positive else radial, upper))
+            around.append((angular if sensor.c_positive else 1.0 - angular, lower))
+            join(y, upper, lower, contact.conductance)
+        for ladder, ohms in ((along, sensor.radial_ohms), (around, sensor.angular_ohms)):
+            ladder.sort()
+            for (start, j), (stop, k) in pairwise(ladder):
+                join(y, j, k, 1.0 / (ohms * max(stop - start, _MIN_PART)))
+        for node in range(size - 1, 3, -1):  # star-mesh: leave the inner nodes out one by one
+            _eliminate(y, node)
+        return tuple(tuple(row[:4]) for row in y[:4])
+
+
+def _eliminate(y: list[list[float]], node: int) -> None:
+    row = y[node]
+    own = row[node]
+    for j in range(node):
+        if row[j]:
+            factor = row[j] / own
+            for k in range(node):
+                y[j][k] -= factor * row[k]
+
+
+def wire_order(wires: str) -> tuple[int, ...]:
+    """Return the index of the electrode on each terminal, for wires such as "BACD": terminal A has electrode B.
+
+    Raises:
+        SensorError: the letters are not A, B, C and D, each once.
+    """
+    if sorted(wires) != list(RIGHT_WIRES):
+        raise SensorError(f'wires must be the letters A, B, C, D, each once, as in "BACD", got {wires!r}')
+    return tuple(RIGHT_WIRES.index(letter) for letter in wires)
+
+
+def reorder(sheets: Matrix, order: Sequence[int]) -> Matrix:
+    """Return what the terminals see of the electrodes: the matrix [S] with its rows and columns exchanged."""
+    return tuple(tuple(sheets[i][j] for j in order) for i in order)
+
+
+class RewiredSheets:
+    """Contact model whose electrodes are on other terminals, by wires as in ``wire_order``."""
+
+    def __init__(self, model: ContactModel, wires: str) -> None:
+        self._model = model
+        self._order = wire_order(wires)
+
+    def admittances(self, sensor: Sensor, scenes: Sequence[Sequence[LayerContact]]) -> list[Matrix]:
+        """Return for each scene of contacts the matrix Y [S] as the terminals A, B, C, D see it."""
+        return [reorder(sheets, self._order) for sheets in self._model.admittances(sensor, scenes)]
+
+    def prepare(self, sensor: Sensor, contact: LayerContact) -> None:
+        """Compute beforehand what would take long when the sensor is touched there."""
+        self._model.prepare(sensor, contact)

@@ -268,12 +268,8 @@ def _linked(path: str, link: str | None) -> Iterator[None]:
 @contextmanager
 def _stoppable() -> Iterator[None]:
     """Let SIGTERM end the program as Ctrl-C does, so that nothing is left behind."""
-
-    def stop(_signal: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
     try:
-        before = signal.signal(signal.SIGTERM, stop)
+        before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     except ValueError:  # not in the main thread, which handles the signals
         yield
         return

@@ -28,8 +28,7 @@ from coneskin.skin.field.multipole import resolution, solve_to_tolerance
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
 
-from .circuit import LayerContact, Matrix
-from .ladder import ResistorLadder
+from .circuit import LayerContact, Matrix, ResistorLadder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -265,5 +264,5 @@ def _limits(sheet: SectorSheet, spots: Sequence[_Spot]) -> list[float]:
 
 
 def _apart(sheet: SectorSheet, first: _Spot, second: _Spot) -> float:
-    u1, phi1, u2, phi2 = (np.array([v]) for v in (first.u, first.phi, second.u, second.phi))
-    return float(centre_distance(sheet, u1, phi1, u2, phi2)[0])
+    places = (np.array([value]) for value in (first.u, first.phi, second.u, second.phi))
+    return float(centre_distance(sheet, *places)[0])

@@ -16,8 +16,7 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTHS, Status, encode
 
-from .circuit import ConverterInputs, LayerContact, frame_of, measure
-from .ladder import ResistorLadder
+from .circuit import ConverterInputs, LayerContact, ResistorLadder, frame_of, measure
 
 _NOISE_COUNTS = 0.5  # counts; a reading without noise would be STUCK
 _MAX_LEVEL = 0.97  # level; the layers are never joined without any resistance

@@ -16,10 +16,20 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, Frame
 
-from .circuit import ContactModel, ConverterInputs, LayerContact, Matrix, frame_of, join, measure
+from .circuit import (
+    RIGHT_WIRES,
+    ContactModel,
+    ConverterInputs,
+    LayerContact,
+    Matrix,
+    ResistorLadder,
+    RewiredSheets,
+    frame_of,
+    join,
+    measure,
+)
 from .fault_injection import FaultInjection, FaultyLine
 from .imperfections import Imperfections
-from .ladder import RIGHT_WIRES, ResistorLadder, RewiredSheets
 from .scripted_touch import PlacedTouch, ScriptedTouch, across_seam
 
 MODELS = ("field", "ladder")

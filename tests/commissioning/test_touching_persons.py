@@ -14,8 +14,7 @@ import pytest
 from coneskin.commissioning import skin_watch
 from coneskin.commissioning.acceptance.commission import prepare
 from coneskin.commissioning.calibration.calibrate import calibration_marks
-from coneskin.commissioning.calibration.forces import ForceSequence, SensorPresses
-from coneskin.commissioning.calibration.touches import SensorTouches, TouchSequence
+from coneskin.commissioning.calibration.touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence
 from coneskin.commissioning.examination.guided_touches import examine_touches, guided_touches
 from coneskin.commissioning.examination.wires import examine_wires
 from coneskin.commissioning.touching import REQUESTS, Mark, Notice

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, frame_of, measure
-from coneskin.skin.virtual.ladder import ResistorLadder
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, WiringFaults, frame_of, measure
 from coneskin.skin.wire import Frame
 
 UR10 = Frustum(0.054, 0.054, 0.434)

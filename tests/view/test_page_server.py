@@ -5,7 +5,7 @@ import socket
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
+from unittest.mock import Mock, patch
 
 import pytest
 
@@ -166,4 +166,24 @@ def test_what_a_viewer_began_ends_though_it_left_at_once(server: PageServer, lea
     if leaves == "later":
         assert ended == []
         callbacks["gone"](client)
+    assert ended == [7]
+
+
+def test_a_viewer_whose_work_fails_leaves_nothing_behind(server: PageServer) -> None:
+    """The next one of its number ends when it goes, and not at once."""
+    callbacks: dict[str, Any] = {}
+    library = SimpleNamespace(
+        on_client_connect=lambda callback: callbacks.update(connected=callback),
+        on_client_disconnect=lambda callback: callbacks.update(gone=callback),
+    )
+    client, ended = SimpleNamespace(client_id=7, camera=SimpleNamespace(aspect=1.6)), []
+    begin = Mock(side_effect=[RuntimeError, lambda: ended.append(7)])
+    with patch.object(server, "_server", library):
+        server.on_viewer(begin)
+    with pytest.raises(RuntimeError):
+        callbacks["connected"](client)
+    callbacks["gone"](client)
+    callbacks["connected"](client)
+    assert ended == []
+    callbacks["gone"](client)
     assert ended == [7]

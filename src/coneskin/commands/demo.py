@@ -130,15 +130,19 @@ def _hold_up(blocks: Iterable[Block]) -> str:
 def _collision_facts(run: Run, touched: float) -> dict[str, Any]:
     """Return the times after the touch [ms], and what happened."""
     events = run.events
-    contact = next((e for e in events if e.name == EventName.CONTACT), None)
+
+    def first(name: str, since: float = -math.inf) -> GuardEvent | None:
+        return next((event for event in events if event.name == name and event.time >= since), None)
+
+    contact, retreated = first(EventName.CONTACT), first(EventName.RETREATED)
+    placed = first(EventName.CONTACT_LOCATED) or contact
+    since = contact.time if contact else math.inf
 
     def after(name: str) -> float | None:
-        event = next((e for e in events if e.name == name and contact and e.time >= contact.time), None)
+        event = first(name, since)
         return None if event is None else round(1e3 * (event.time - touched), 3)
 
-    commands = [b.time for b in run.blocks if b.kind == BlockKind.COMMAND and contact and b.time >= contact.time]
-    retreated = next((e for e in events if e.name == EventName.RETREATED), None)
-    placed = next((e for e in events if e.name == EventName.CONTACT_LOCATED), contact)
+    commands = [block.time for block in run.blocks if block.kind == BlockKind.COMMAND and block.time >= since]
     return {
         "contacts": sum(e.name == EventName.CONTACT for e in events),
         "frame_ms": after("contact"),

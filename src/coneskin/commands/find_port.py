@@ -13,20 +13,16 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from coneskin.core.errors import SkinTimeout
 from coneskin.core.text import positive_seconds
 
 from .terminal import print_line
 
 if TYPE_CHECKING:
     from coneskin.skin.sources.serial_port import PortFacts
-
-_POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,13 +35,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find a port, or list those that are there."""
-    from coneskin.commissioning.line.port_search import port_trouble, stable_name
+    from coneskin.commissioning.line.port_search import await_port, port_trouble, stable_name
     from coneskin.skin.sources.serial_port import find_ports
 
     if args.list:
         return _list(find_ports(), args.json)
     say = partial(print_line, file=sys.stderr)
-    port = _find_port(find_ports, say, args.timeout_s)
+    port = await_port(find_ports, say, args.timeout_s)
     trouble, name = port_trouble(port.device), stable_name(port.device)
     if args.json:
         print(json.dumps({"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}))
@@ -54,35 +50,6 @@ def run(args: argparse.Namespace) -> int:
     if trouble:
         say(trouble)
     return 1 if trouble else 0
-
-
-def _find_port(
-    look: Callable[[], Sequence[PortFacts]],
-    say: Callable[[str], None],
-    timeout: float,
-    clock: Callable[[], float] = time.monotonic,
-    sleep: Callable[[float], None] = time.sleep,
-) -> PortFacts:
-    """Watch the list of ports for a time [s] until one has come, and tell the person what to do.
-
-    Raises:
-        SkinTimeout: none has come.
-    """
-    from coneskin.commissioning.line.port_search import PortSearch
-
-    search = PortSearch(look())
-    say(f"{search.request} (within {timeout:g} s; Ctrl-C ends)")
-    end = clock() + timeout
-    while search.found is None:
-        if clock() >= end:
-            raise SkinTimeout(
-                f"no port has come within {timeout:g} s; try another cable (some only charge) and another USB port, "
-                "and see whether `dmesg` names the device"
-            )
-        sleep(_POLL_PERIOD)
-        if words := search.update(look()):
-            say(words if search.found else f"{words}: {search.request}")
-    return search.found
 
 
 def _list(ports: Sequence[PortFacts], as_json: bool) -> int:

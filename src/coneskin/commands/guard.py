@@ -92,7 +92,7 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
         else:
             print_line(lines.describe(event, session.began))
 
-    signal.signal(signal.SIGTERM, _as_interrupt)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the arm is stopped, the recording closed
     start_timeout = _START_TIMEOUT if args.duration_s is None else min(_START_TIMEOUT, args.duration_s)
     session = guard(scene, on_event=show, start_timeout=start_timeout)
     work = _Work(session, math.inf if args.duration_s is None else args.duration_s, args.once)
@@ -119,11 +119,6 @@ def _last_words(session: Session) -> str:
     if not any(event.name == EventName.ACTIVATED for event in session.events):
         return "the guard was not active yet, and has not moved the arm"
     return STANDS if stands(session.events) else f"{NOT_CONFIRMED}: look at the arm"
-
-
-def _as_interrupt(_signal: int, _frame: object) -> None:
-    """Take SIGTERM as Ctrl-C: the arm is stopped and the recording closed."""
-    raise KeyboardInterrupt
 
 
 class _Work:

@@ -263,22 +263,19 @@ def _sides(args: argparse.Namespace, beside: Path | None = None) -> tuple[Decisi
 
     settings = parse_settings(args.set)
     first = _read(args.one)
-    second = first if beside is None else _read(beside)
+    second, label = (first, "today's code") if beside is None else (_read(beside), str(args.one))
     if args.python is not None:
         from coneskin.runs.event_file import decide_with
 
         if beside is not None:
             raise RecordingError("--python compares two versions of the code on one run: leave B out")
-        today = decide_again(first, settings, "today's code", progress=ProgressBar("today's code"))
+        today = decide_again(first, settings, label, progress=ProgressBar(label))
         return decide_with(args.python, args.one, recorded_decisions(first)), today
     if settings:
-        label = "today's code" if beside is None else str(args.one)
         before = decide_again(first, label=label, progress=ProgressBar(label))
         return before, decide_again(second, settings, progress=ProgressBar("with the settings"))
     if beside is None:
-        return recorded_decisions(first), decide_again(
-            first, label="today's code", progress=ProgressBar("today's code")
-        )
+        return recorded_decisions(first), decide_again(first, label=label, progress=ProgressBar(label))
     return recorded_decisions(first, str(args.one)), recorded_decisions(second, str(beside))
 
 

@@ -135,24 +135,28 @@ class PageServer:
         Args:
             begin: takes viser's ``ClientHandle``, and returns what ends its work when the viewer has gone.
         """
-        ends: dict[int, Callable[[], None]] = {}  # a stand-in of those who went while their work was being prepared
+        ends: dict[int, Callable[[], None]] = {}
         changing = threading.Lock()
+
+        def meet(viewer: int, end: Callable[[], None]) -> Callable[[], None] | None:
+            """Return what has been left for a viewer; where nothing has, leave an end for what comes later."""
+            with changing:
+                if (left := ends.pop(viewer, None)) is None:
+                    ends[viewer] = end
+            return left
 
         def connected(client: Any) -> None:
             if (aspect := client.camera.aspect) < 1.0:  # a phone's window is as wide as others are high
                 client.camera.fov = 2.0 * math.atan(math.tan(0.5 * _FIELD_OF_VIEW) / aspect)
-            end = begin(client)
-            with changing:
-                already_gone = ends.setdefault(client.client_id, end) is not end
-            if already_gone:
-                del ends[client.client_id]
-                end()
+            end = _nothing
+            try:
+                end = begin(client)
+            finally:
+                if meet(client.client_id, end) is not None:  # it has gone meanwhile
+                    end()
 
         def gone(client: Any) -> None:
-            with changing:
-                end = ends.setdefault(client.client_id, _nothing)
-            if end is not _nothing:
-                del ends[client.client_id]
+            if (end := meet(client.client_id, _nothing)) is not None:
                 end()
 
         self._server.on_client_connect(connected)

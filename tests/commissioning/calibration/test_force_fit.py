@@ -6,7 +6,7 @@ import re
 import pytest
 
 from coneskin.commissioning.calibration.calibrate import calibration_marks
-from coneskin.commissioning.calibration.forces import ForceSequence, SensorPresses, _KnownPress, fit_forces
+from coneskin.commissioning.calibration.touches import ForceSequence, SensorPresses, _KnownPress, fit_forces
 from coneskin.commissioning.touching import Touching
 from coneskin.core.errors import SceneError, SensorError, SkinError
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor

@@ -17,9 +17,8 @@ from coneskin.commissioning.examination.wires import (
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
+from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure, reorder, wire_order
 from coneskin.skin.virtual.field_contacts import FieldContacts
-from coneskin.skin.virtual.ladder import reorder, wire_order
 
 #: a whole cylinder; a wide cone
 SENSORS = [

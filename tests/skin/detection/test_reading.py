@@ -11,8 +11,7 @@ from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, measure
-from coneskin.skin.virtual.ladder import ResistorLadder
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, WiringFaults, measure
 from coneskin.skin.wire import DrivenPotentials, Status
 
 from ..bench_top import CONE, UR10, measured

@@ -9,8 +9,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.wiring_hypothesis import PointContact, list_hypotheses
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, measure
-from coneskin.skin.virtual.ladder import ResistorLadder
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, WiringFaults, measure
 
 FOREARM = Frustum(0.0375, 0.0375, 0.24, math.radians(350))
 

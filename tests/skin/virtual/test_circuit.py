@@ -7,8 +7,7 @@ import pytest
 from coneskin.core.errors import SensorError
 from coneskin.skin.electronics import Electronics, LeadOhms
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, WiringFaults, measure, solve
-from coneskin.skin.virtual.ladder import ResistorLadder
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, WiringFaults, measure, solve
 
 from ..bench_top import CONE, UR10
 

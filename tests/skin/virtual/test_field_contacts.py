@@ -17,9 +17,8 @@ from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.model import FieldModel
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import LayerContact, frame_of, measure
+from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, frame_of, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
-from coneskin.skin.virtual.ladder import ResistorLadder
 from tests.support.field.contact_patch import ContactPatch, disc, solve_patch
 
 from ..bench_top import UR10

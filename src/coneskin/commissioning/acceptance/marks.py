@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import power, shifts
@@ -158,26 +157,18 @@ def _azimuths(placed: SensorOnArm, u: float) -> Callable[[Vector], float]:
             return math.atan2(y, x) % _FULL_TURN
 
         return azimuth
-    centre, first = side.centre(u), side.normal(0.0)
-    ahead = cross(added(side.centre(side.frustum.slant), scaled(side.centre(0.0), -1.0)), first)
-    length = math.hypot(*ahead)
+    import numpy as np
 
-    def angle(way: Vector) -> float:
-        """Return the angle of a direction about the middle [rad], from the normal of edge 0 on."""
-        y, x = (sum(a * b for a, b in zip(way, one, strict=True)) for one in (scaled(ahead, 1.0 / length), first))
-        return math.atan2(y, x)
-
-    steps = [side.frustum.wrap * k / _SIDE_STEPS for k in range(_SIDE_STEPS + 1)]
-    angles = [angle(added(side.point(u, phi), scaled(centre, -1.0))) for phi in steps]
+    first = np.array(side.normal(0.0))
+    ahead = np.cross(np.array(side.centre(side.frustum.slant)) - side.centre(0.0), first)
+    ahead /= np.linalg.norm(ahead)
+    steps = np.linspace(0.0, side.frustum.wrap, _SIDE_STEPS + 1)
+    ways = side.place(u, steps)[0] - side.centre(u)
+    angles = np.unwrap(np.arctan2(ways @ ahead, ways @ first))  # about the middle, from the normal of edge 0 on
 
     def bent_azimuth(way: Vector) -> float:
-        sought = angle(way)
-        for (one, two), (low, high) in zip(pairwise(steps), pairwise(angles), strict=True):
-            span = math.remainder(high - low, _FULL_TURN)
-            part = math.remainder(sought - low, _FULL_TURN) / span if span else 0.0
-            if 0.0 <= part <= 1.0 and abs(span) < 1.0:
-                return one + part * (two - one)
-        return _FULL_TURN  # where no part of the sheet is
+        sought = angles[0] + (math.atan2(way @ ahead, way @ first) - angles[0]) % _FULL_TURN
+        return float(np.interp(sought, angles, steps, right=_FULL_TURN))  # where no part of the sheet is
 
     return bent_azimuth
 

@@ -23,8 +23,7 @@ from coneskin.scene.tables.sensor_keys import CONE_KEYS
 from coneskin.scene.values.calibration_file import CalibrationRecord, TouchResult, sensor_fingerprint
 
 from .fit import CalibrationFit, fit_map
-from .forces import ForceSequence, SensorPresses, fit_forces
-from .touches import SensorTouches, TouchSequence
+from .touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence, fit_forces
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

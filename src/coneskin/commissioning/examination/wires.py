@@ -20,8 +20,16 @@ from itertools import permutations
 from typing import TYPE_CHECKING, NamedTuple
 
 from coneskin.core.finding import Finding
-from coneskin.skin.virtual.circuit import ConverterInputs, LayerContact, Matrix, measure
-from coneskin.skin.virtual.ladder import RIGHT_WIRES, ResistorLadder, reorder, wire_order
+from coneskin.skin.virtual.circuit import (
+    RIGHT_WIRES,
+    ConverterInputs,
+    LayerContact,
+    Matrix,
+    ResistorLadder,
+    measure,
+    reorder,
+    wire_order,
+)
 
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor

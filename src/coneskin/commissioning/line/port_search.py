@@ -1,60 +1,68 @@
-"""Search for the port of a device that is unplugged and plugged in again: lists of ports go in, words come out."""
+"""Search for the port of a device that is unplugged and plugged in again."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import PortFacts
 
 _BY_ID = Path("/dev/serial/by-id")
+_POLL_PERIOD = 0.2  # s between two looks at the list of ports
 
 
-class PortSearch:
-    """Search of one port, which begins with the ports that are there.
+def await_port(
+    look: Callable[[], Sequence[PortFacts]],
+    say: Callable[[str], None],
+    timeout: float,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> PortFacts:
+    """Watch the list of ports for a time [s] until one has come, and tell the person what to do.
 
-    Attributes:
-        found: the port, once it is known.
+    Args:
+        look: returns the ports that are there.
+        say: takes what the person is told.
+        timeout: for a port to come [s].
+        clock: [s].
+        sleep: lets so many seconds pass.
+
+    Raises:
+        SkinTimeout: none has come.
     """
+    before, unplugged, end = {port.device: port for port in look()}, dict[str, PortFacts](), clock() + timeout
 
-    def __init__(self, present: Sequence[PortFacts]) -> None:
-        self._present = {port.device: port for port in present}
-        self._unplugged: dict[str, PortFacts] = {}
-        self.found: PortFacts | None = None
+    def request() -> str:
+        return "plug it in again" if unplugged else "unplug the device" if before else "plug the device in"
 
-    @property
-    def request(self) -> str:
-        """What the person has to do now."""
-        if self._unplugged:
-            return "plug it in again"
-        return "unplug the device" if self._present else "plug the device in"
-
-    def update(self, present: Sequence[PortFacts]) -> str:
-        """Compare the ports that are there now with those before.
-
-        Returns:
-            what has changed, for the person; empty where nothing has.
-        """
-        now = {port.device: port for port in present}
-        gone = [port for device, port in self._present.items() if device not in now]
-        come = [port for device, port in now.items() if device not in self._present]
-        self._present = now
-        self._unplugged.update((port.device, port) for port in gone)
-        if len(come) > 1:
-            self._unplugged.clear()
-            listing = ", ".join(port.device for port in come)
-            return f"{len(come)} ports have come at once, {listing}: unplug one device only, and not a hub"
+    say(f"{request()} (within {timeout:g} s; Ctrl-C ends)")
+    while clock() < end:
+        sleep(_POLL_PERIOD)
+        now = {port.device: port for port in look()}
+        gone = [port for device, port in before.items() if device not in now]
+        come = [port for device, port in now.items() if device not in before]
+        before = now
+        unplugged.update((port.device, port) for port in gone)
+        if len(come) == 1:
+            port = come[0]
+            same = [old.device for old in unplugged.values() if port.hardware and old.hardware == port.hardware]
+            moved = len(same) == 1 and same[0] != port.device
+            say(f"{port} has come" + (f"; it was {same[0]} before" if moved else ""))
+            return port
         if come:
-            self.found = come[0]
-            before = self._same_device(come[0])
-            return f"{come[0]} has come" + (f"; it was {before} before" if before and before != come[0].device else "")
-        return f"{', '.join(port.device for port in gone)} {'has' if len(gone) == 1 else 'have'} gone" if gone else ""
-
-    def _same_device(self, port: PortFacts) -> str:
-        """Return under which name the same device was there before; empty where nobody knows."""
-        same = [old.device for old in self._unplugged.values() if port.hardware and old.hardware == port.hardware]
-        return same[0] if len(same) == 1 else ""
+            unplugged.clear()
+            listing = ", ".join(port.device for port in come)
+            say(f"{len(come)} ports have come at once, {listing}: unplug one device only, and not a hub: {request()}")
+        elif gone:
+            verb = "has" if len(gone) == 1 else "have"
+            say(f"{', '.join(port.device for port in gone)} {verb} gone: {request()}")
+    raise SkinTimeout(
+        f"no port has come within {timeout:g} s; try another cable (some only charge) and another USB port, and see "
+        "whether `dmesg` names the device"
+    )
 
 
 def stable_name(device: str, folder: Path = _BY_ID) -> str:

@@ -20,10 +20,9 @@ from coneskin.skin.detection.place.single_contact import (
 )
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.circuit import ContactModel, LayerContact, measure
+from coneskin.skin.virtual.circuit import ContactModel, LayerContact, ResistorLadder, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from coneskin.skin.virtual.imperfections import ContactLaw
-from coneskin.skin.virtual.ladder import ResistorLadder
 from coneskin.skin.wire import Frame
 
 FOREARM = Frustum(0.0375, 0.0375, 0.24, math.radians(350))  # UR5e
