@@ -43,7 +43,7 @@ from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 
 from .dimensions import add_key_options, given_keys, option_name
-from .terminal import ending_signals, print_hint
+from .terminal import add_urdf_options, ending_signals, print_hint, urdf_options
 
 _NO_FIT_EXIT_CODE = 3
 _LEAST_BRIDGED_SHARE = 0.0005  # of a sheet that spans holes; less would print as 0.0 %
@@ -71,9 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_key_options(add, _SHORT_KEYS, defaults={"tolerance": "1", "max_sheets": "2"})
     seam_help = "direction in which the seam faces, as the cable (default: where the link shields it most)"
     add("--seam", type=float, nargs=3, metavar=("X", "Y", "Z"), help=seam_help)
-    package_help = "folder of a ROS package that a URDF names (package://NAME/...); may be repeated"
-    add("--package", metavar="NAME=DIR", help=package_help, **many)
-    add("--xacro-arg", metavar="NAME=VALUE", help="argument of a xacro file (extra xacro); may be repeated", **many)
+    add_urdf_options(add)
 
     add = parser.add_argument_group("a link by its dimensions").add_argument
     defaults = {"radius2": "radius 1, a cylinder", "wrap": "360, or the widest that fits the mesh"}
@@ -115,12 +113,9 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
 
     settings = read_settings(args.options, args.set)
     search = {**settings.search, **given_keys(args, _SHORT_KEYS)}
-    packages = _pairs(args.package, "--package takes NAME=DIR, as in --package ur_description=src/ur_description")
-    arguments = _pairs(args.xacro_arg, "--xacro-arg takes NAME=VALUE, as in --xacro-arg ur_type=ur5e")
     common: dict[str, Any] = {
         "options": settings.options,
-        "packages": packages,
-        "arguments": arguments,
+        **urdf_options(args),
         "files": settings.files,
         "pictures": not args.no_pictures,
         "replace": args.force,
@@ -204,16 +199,6 @@ def _seam(way: Sequence[float], search: dict[str, Any]) -> tuple[float, ...]:
     if not 0.0 < math.hypot(*way) < math.inf:
         raise GeometryError(f"--seam takes a direction X Y Z, finite and not 0 0 0, got {' '.join(map(str, way))}")
     return tuple(way)
-
-
-def _pairs(texts: list[str], rule: str) -> dict[str, str]:
-    pairs = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise GeometryError(f"{rule}: {text}")
-        pairs[name] = value
-    return pairs
 
 
 def _report_nothing(nothing: NothingFits) -> int:

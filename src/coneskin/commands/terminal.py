@@ -18,6 +18,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from coneskin.core.errors import GeometryError
 from coneskin.core.text import positive_seconds
 
 if TYPE_CHECKING:
@@ -99,6 +100,33 @@ def ending_signals() -> Iterator[Callable[[], None]]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
+
+
+def add_urdf_options(add: Callable[..., Any]) -> None:
+    """Declare the options by which the packages of a URDF, and the arguments of a xacro file, are found."""
+    many: dict[str, Any] = {"action": "append", "default": []}
+    package_help = "folder of a ROS package that a URDF names (package://NAME/...); may be repeated"
+    add("--package", metavar="NAME=DIR", help=package_help, **many)
+    add("--xacro-arg", metavar="NAME=VALUE", help="argument of a xacro file (extra xacro); may be repeated", **many)
+
+
+def urdf_options(args: argparse.Namespace) -> dict[str, dict[str, str]]:
+    """Return ``packages`` and ``arguments``, as a URDF is read with them.
+
+    Raises:
+        GeometryError: an option is no pair.
+    """
+    pairs: dict[str, dict[str, str]] = {"packages": {}, "arguments": {}}
+    for texts, found, rule in (
+        (args.package, pairs["packages"], "--package takes NAME=DIR, as in --package ur_description=ur_description"),
+        (args.xacro_arg, pairs["arguments"], "--xacro-arg takes NAME=VALUE, as in --xacro-arg ur_type=ur5e"),
+    ):
+        for text in texts:
+            name, equals, value = text.partition("=")
+            if not (name and equals and value):
+                raise GeometryError(f"{rule}: {text}")
+            found[name] = value
+    return pairs
 
 
 def add_page_options(parser: argparse.ArgumentParser, port: int) -> None:

@@ -159,6 +159,17 @@ def find_link_sheets(source: LinkMesh, progress: Callable[[str], None], **search
     return replace(fit, notes=(*fit.notes, note)) if note else fit
 
 
+def room_for(options: DesignOptions) -> dict[str, Any]:
+    """Return those fields of ``FitOptions`` that leave room for the sheets, electrodes and gaps of a design."""
+    plan = options.plan or NARROWEST_PLAN
+    return {
+        "thickness": options.stack.thickness,
+        "gap": options.sheet_gap,
+        "min_radius": 2.0 * plan.lead,
+        "min_arc": plan.least_arc,
+    }
+
+
 def _called_visual(path: str) -> bool:
     """Tell whether a path calls its mesh the visual one, as ROS descriptions do; the nearest name counts."""
     for part in reversed(Path(path).parts):
@@ -303,15 +314,7 @@ def design_link(
 
     options = options or DesignOptions()
     check_names(search, ("round_only",))
-    plan = options.plan or NARROWEST_PLAN
-    # neighbors about other axes need room for the sheets of these options
-    search = {
-        "thickness": options.stack.thickness,
-        "gap": options.sheet_gap,
-        "min_radius": 2.0 * plan.lead,
-        "min_arc": plan.least_arc,
-        **search,
-    }
+    search = room_for(options) | search
     source: LinkMesh | None = None
     fit: LinkFit | None = None
     name, frame, origin = "a link by its dimensions", "the axis of the link (z from end 1, x at phi = 0)", ""

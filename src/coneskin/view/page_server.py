@@ -124,10 +124,12 @@ class PageServer:
             self._server.stop()
 
     def look_from(self, position: tuple[float, float, float], at: tuple[float, float, float]) -> None:
-        """Set from where a new viewer looks, and at what [m]."""
+        """Set from where viewers look, and at what [m]."""
         self._server.initial_camera.position = position
         self._server.initial_camera.look_at = at
         self._server.initial_camera.fov = _FIELD_OF_VIEW
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = position, at
 
     def on_viewer(self, begin: Callable[[Any], Callable[[], None]]) -> None:
         """Call a function for each viewer that connects.

@@ -60,7 +60,7 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
                                state="attached")  # fmt: skip
         page.wait_for_function(DISTANCE + " > 0.3")  # of a link of 0.2 m
         before = page.inner_text("#coneskin-facts")
-        thumb = page.locator("[role=slider]").first  # takes length off end 1, half a millimetre with each key
+        thumb = page.locator("[role=slider]").first  # moves end 1 along, half a millimetre with each key
         thumb.focus()
         for _ in range(4):
             thumb.press("ArrowRight")

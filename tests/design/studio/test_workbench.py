@@ -2,7 +2,6 @@
 
 import math
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -13,10 +12,9 @@ import pytest
 from coneskin.cli import main
 from coneskin.core.errors import GeometryError
 from coneskin.design.link_design import LinkMesh, design_link
-from coneskin.design.sheets.sheet_design import DesignOptions
-from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, warning_list
+from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, robot_facts, warning_list
 from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
-from coneskin.design.studio.workbench import Handles, Workbench, _adjusted
+from coneskin.design.studio.workbench import Handles, RobotLinks, Wish, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.fit.cones import LinkFit
@@ -26,6 +24,7 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
+from coneskin.geometry.sector import unroll
 from coneskin.scene.reader import load_scene
 from coneskin.view.page_server import PageServer
 from tests.geometry.fit.test_seam_place import tube_with_wing
@@ -40,7 +39,7 @@ BENDS = tuple(
 )
 OVAL = Developable(Frustum(ROUND / math.tau, ROUND / math.tau, 0.20), FULL.link_frustum, BENDS)
 PART = PlacedFrustum(Frustum(0.04, 0.06, 0.20, math.radians(200.0)), FULL.link_frustum)
-HANDLES = Handles(0.03, 0.05, math.radians(150.0), math.radians(20.0))
+HANDLES = Handles(0, 0.03, 0.12, math.radians(150.0), math.radians(20.0))
 
 
 @pytest.mark.parametrize("found", [FULL, PART, OVAL], ids=["a full wrap", "a partial wrap", "an oval"])
@@ -72,11 +71,12 @@ def test_an_oval_link_is_found_shown_and_written(tmp_path: Path) -> None:
     """The colours of the bands say what the tube is: its corners lie on the sheet, within the height of its facets."""
     mesh = oval_tube(FULL.link_frustum, 0.1).mesh(around=120)
     made = Workbench.of(LinkMesh("oval", mesh, "its own", ()))
-    (sheet,) = made.fit.sheets
-    bands = deviation_bands(RayCaster(mesh), sheet.placed, made.fit.tolerance)
+    (sheet,) = made.wish.fit.sheets
+    bands = deviation_bands(RayCaster(mesh), sheet.placed, made.wish.fit.tolerance)
     assert {(band.low < 0.0 or band.high > 0.0) and max(-band.low, band.high) < 5e-4 for band in bands} == {True}
-    made.handle(0, Handles(0.01, 0.005, math.radians(200.0), math.radians(30.0)))
-    assert "<td>general cylinder</td>" in design_facts(made.designs)
+    length = sheet.frustum.height - 0.015
+    made.handle(0, Handles(0, 0.01, length, math.radians(200.0), math.radians(30.0)))
+    assert "general cylinder</td>" in design_facts(made.designs)
     made.write(tmp_path / "skin", pictures=False)
     text = (tmp_path / "skin" / "sensor.toml").read_text(encoding="utf-8")
     assert "bend_wrap_deg" in text
@@ -92,7 +92,7 @@ def test_what_nobody_touched_is_written_as_by_design(tmp_path: Path) -> None:
     """A tube with a wing at its foot, behind which the seam goes."""
     link = LinkMesh("wing", tube_with_wing(0.7), "its own", ())
     made = Workbench.of(link)
-    assert any("the link itself shields" in note for note in made.link.notes)
+    assert any("the link itself shields" in note for note in made.seam_notes())
     made.write(tmp_path / "studio", pictures=False)
     design_link(link.mesh, tmp_path / "design", pictures=False)
     written = [tomllib.loads((tmp_path / name / "sensor.toml").read_text()) for name in ("studio", "design")]
@@ -107,27 +107,27 @@ def test_a_partial_wrap_is_not_turned_beyond_what_was_found() -> None:
     assert last == pytest.approx(PART.frustum.wrap)
 
 
-@pytest.mark.parametrize("handles", [Handles(0.1, 0.095), Handles(-0.01), Handles(0.0, -0.01), Handles(wrap=0.0)])
+@pytest.mark.parametrize(
+    "handles", [Handles(along=0.195), Handles(along=-0.01), Handles(length=0.005), Handles(wrap=0.0)]
+)
 def test_what_is_no_sheet_is_refused(handles: Handles) -> None:
     with pytest.raises(GeometryError):
         _adjusted(FULL, handles)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def bench() -> Workbench:
     """A cone of 40 to 55 mm with shorter ones at its ends; the search for cones has tests of its own."""
     mesh = placed(revolve([(0.0, 0.030), (0.02, 0.040), (0.18, 0.055), (0.20, 0.03)], 96, 4), Pose())
     side = PlacedFrustum(Frustum(0.040, 0.055, 0.16), Pose(translation=(0.0, 0.0, 0.02)))
     sheet = FittedSheet(side, 2e-4, 1e-4, 0.0, 0.0, 0.8, 0.8, 0.0)
     fit = LinkFit((sheet,), None, 1e-3, 0.2, 0.05, (), "", 1)
-    made = Workbench(LinkMesh("a <link>", mesh, "its own", ("a <note>",)), fit, DesignOptions(link="a link"))
-    made.handles = [Handles()]
-    made.update()
-    return made
+    wish = Wish(fit, (Handles(),), ("the seam of sheet 1 faces nowhere",))
+    return Workbench(LinkMesh("a <link>", mesh, "its own", ("a <note>",)), wish)
 
 
 def test_the_bands_show_how_far_the_link_is_off_the_sheet(bench: Workbench) -> None:
-    (sheet,) = bench.fit.sheets
+    (sheet,) = bench.wish.fit.sheets
     rays = RayCaster(bench.link.mesh)
     on_it = {band.low for band in deviation_bands(rays, sheet.placed, 0.001)}
     assert on_it == {-0.001 / 7.0} or max(map(abs, on_it)) < 0.0005
@@ -144,15 +144,82 @@ def test_the_bands_show_how_far_the_link_is_off_the_sheet(bench: Workbench) -> N
 
 
 def test_a_handle_designs_the_sheet_again_and_is_said(bench: Workbench) -> None:
-    before = bench.designs[0].place.frustum.height
-    bench.handle(0, Handles(from_end1=0.02))
-    assert bench.designs[0].place.frustum.height == pytest.approx(before - 0.02)
-    assert f"{1e3 * (before - 0.02):.1f} mm" in design_facts(bench.designs)
-    bench.handle(0, Handles(from_end1=0.2))
+    bench.handle(0, Handles(along=0.02, length=0.10))
+    assert bench.designs[0].place.frustum.height == pytest.approx(0.10)
+    assert "height, wrap</td><td style='padding-right:8px'>100.0 mm" in design_facts(bench.designs)
+    bench.handle(0, Handles(along=0.155))
     assert bench.designs == ()
-    assert "a sheet needs 10 mm" in bench.warnings()[0]
-    bench.handle(0, Handles())
-    assert bench.designs[0].place.frustum.height == pytest.approx(before)
+    assert "it needs 10 mm" in bench.warnings()[0]
+    bench.undo()
+    assert bench.designs[0].place.frustum.height == pytest.approx(0.10)
+
+
+def test_moves_of_one_handle_are_undone_at_once(bench: Workbench) -> None:
+    whole = bench.wish
+    for step in range(1, 5):
+        bench.handle(0, Handles(along=0.01 * step), again=step > 1)
+    bench.handle(0, Handles(along=0.04, wrap=5.0))
+    bench.undo()
+    assert bench.wish.handles == (Handles(along=0.04),)
+    bench.undo()
+    bench.undo()  # there is nothing before
+    assert bench.wish == whole
+
+
+def test_a_seam_that_was_turned_is_said_where_it_is(bench: Workbench) -> None:
+    assert "the seam of sheet 1 faces nowhere" in bench.warnings()
+    bench.handle(0, Handles(seam=math.radians(90.0)))
+    assert bench.seam_notes() == ("the seam of sheet 1 faces (0.00, 1.00, 0.00) of the link's frame",)
+    assert bench.designs[0].place.link_frustum.rotate((1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
+
+
+def test_a_sheet_is_added_where_its_side_is_bare_and_deleted(bench: Workbench) -> None:
+    with pytest.raises(GeometryError, match="side 1 is covered all along"):
+        bench.add(0)
+    bench.handle(0, Handles(along=0.10))
+    bench.add(0)
+    assert bench.wish.handles[1].along == 0.0
+    assert bench.wish.handles[1].length == pytest.approx(0.10 - bench.options.sheet_gap)
+    assert bench.places == (0, 1)
+    first, second = (design.place for design in bench.designs)
+    assert second.frustum.radius1 == pytest.approx(0.040)
+    assert first.centre(0.0)[2] > second.centre(second.frustum.slant)[2]
+    assert "<b>8 wires</b>" in design_facts(bench.designs)
+    bench.delete(0)
+    assert [design.name for design in bench.designs] == ["sheet 1"]
+    assert bench.designs[0].place.frustum.radius1 == pytest.approx(0.040)
+    bench.delete(0)
+    assert (bench.designs, bench.places) == ((), ())
+    bench.add(0)
+    assert bench.wish.handles == (Handles(),)
+
+
+def test_each_layer_has_its_own_r1(bench: Workbench) -> None:
+    """The page said r1 of the bare link beside a drawing of a layer on it."""
+    facts = design_facts(bench.designs)
+    for cut in bench.designs[0].cuts:
+        assert f"{cut.name}</td><td style='padding-right:8px'>{1e3 * unroll(cut.surface).r1:.1f}<" in facts
+
+
+def test_links_of_a_robot_stand_where_its_joints_are_at_zero(tmp_path: Path) -> None:
+    """Two tubes of 0.2 m: the second one at a joint that cannot reach 0, but 90 deg."""
+    for name in ("first", "second"):
+        (tmp_path / f"{name}.stl").write_bytes(stl(placed(revolve([(0.0, 0.04), (0.2, 0.04)], 24, 2), Pose())))
+    robot = tmp_path / "robot.urdf"
+    link = '<link name="{0}"><visual><geometry><mesh filename="{0}.stl"/></geometry></visual></link>'
+    robot.write_text(
+        f"""<robot name="two">{link.format("first")}{link.format("second")}<joint name="j" type="revolute">
+        <parent link="first"/><child link="second"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>
+        <limit lower="{math.pi / 2}" upper="3" effort="1" velocity="1"/></joint></robot>"""
+    )
+    links = RobotLinks(str(robot), lambda link: Workbench(link, Wish(LinkFit((), None, 1e-3, 0, 0, (), "none", 1), ())))
+    poses = links.poses()
+    assert poses["first"] == Pose()
+    assert poses["second"].apply((0.0, 0.0, 0.1)) == pytest.approx((0.1, 0.0, 0.2))
+    assert links.open("second") is links.open("second")
+    facts = robot_facts([(name, links.opened[name].designs if name in links.opened else None) for name in links.names])
+    assert "first</td><td style='padding-right:8px'>not opened" in facts
+    assert "second</td><td style='padding-right:8px'>0<" in facts
 
 
 def test_what_a_file_says_is_never_taken_for_html(bench: Workbench) -> None:
@@ -164,7 +231,7 @@ def test_what_a_file_says_is_never_taken_for_html(bench: Workbench) -> None:
 
 @pytest.mark.long
 def test_it_writes_the_folder_that_a_scene_reads(bench: Workbench, tmp_path: Path) -> None:
-    bench.handle(0, Handles(from_end1=0.02))
+    bench.handle(0, Handles(along=0.02))
     files = bench.write(tmp_path / "skin", pictures=False)
     assert {"report.md", "sensor.toml", "design.json"} <= set(files)
     assert sum(name.startswith("cut/") and name.endswith(".dxf") for name in files) >= 7
@@ -174,7 +241,6 @@ def test_it_writes_the_folder_that_a_scene_reads(bench: Workbench, tmp_path: Pat
     assert sensor.placed.frustum.height == pytest.approx(bench.designs[0].active.frustum.height, abs=1e-6)
     with pytest.raises(GeometryError, match="skin"):
         bench.write(tmp_path / "skin", pictures=False)
-    bench.handle(0, Handles())
 
 
 def stl(mesh: Mesh) -> bytes:
@@ -227,7 +293,7 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
         if link.name == "slow":  # while its sheets are looked for
             page._upload.value = SimpleNamespace(name="quick.stl", content=data)
             page._take_upload()
-        return replace(bench, link=link)
+        return Workbench(link, bench.wish)
 
     with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, load)

@@ -170,25 +170,53 @@ def _css(colour: tuple[int, int, int]) -> str:
 
 
 def design_facts(designs: Sequence[SheetDesign]) -> str:
-    """Return r1, r2, theta0, area and the forecast of each sheet."""
+    """Return size, area and forecast of each sheet, and r1, r2 and theta0 of each of its layers as they are cut."""
     parts = []
     for design in designs:
-        sector, cone = unroll(design.place.frustum), design.place.frustum
+        cone = design.place.frustum
         coarse = [max(item.along, item.around) for item in design.forecasts()]
-        r1 = "infinite" if math.isinf(sector.r1) else f"{1e3 * sector.r1:.1f} mm"
-        r2 = "infinite" if math.isinf(sector.r2) else f"{1e3 * sector.r2:.1f} mm"
-        rows = (
+        rows = [
             ("side", design.place.kind),
-            ("r1, r2", f"{r1}, {r2}"),
-            ("theta0", f"{math.degrees(sector.theta0):.2f} deg"),
-            ("radii", f"{1e3 * cone.radius1:.2f} and {1e3 * cone.radius2:.2f} mm"),
+            ("radii on the link", f"{1e3 * cone.radius1:.2f} and {1e3 * cone.radius2:.2f} mm"),
             ("height, wrap", f"{1e3 * cone.height:.1f} mm, {math.degrees(cone.wrap):.1f} deg"),
             ("active area on the link", f"{1e4 * design.layout.active.area(cone):.1f} cm2"),
+            ("wires", f"4, at {design.layout.plan.wires}"),
             ("one count", f"{1e3 * min(coarse):.3f} to {1e3 * max(coarse):.3f} mm"),
-        )
-        body = "".join(f"<tr><td>{escape(name)}</td><td>{escape(value)}</td></tr>" for name, value in rows)
-        parts.append(f"<b>{escape(design.name)}</b><table style='font-size:12px'>{body}</table>")
-    return f'<div id="coneskin-facts" style="font-size:13px;margin:4px 10px">{"".join(parts) or "no sheet"}</div>'
+        ]
+        layers = [("layer", "r1 [mm]", "r2 [mm]", "theta0 [deg]")]
+        for cut in design.cuts:
+            sector = unroll(cut.surface)
+            theta0 = f"{math.degrees(sector.theta0):.2f}"
+            layers.append((cut.name, _radius(sector.r1), _radius(sector.r2), theta0))
+        parts.append(f"<b>{escape(design.name)}</b>{_table(rows)}{_table(layers)}")
+    count = f"<b>{4 * len(designs)} wires</b><br>" if designs else ""
+    parts = parts or ["no sheet"]
+    return f'<div id="coneskin-facts" style="font-size:13px;margin:4px 10px">{count}{"".join(parts)}</div>'
+
+
+def robot_facts(links: Sequence[tuple[str, Sequence[SheetDesign] | None]]) -> str:
+    """Return sheets, wires and active area of each link of a robot; None where a link was not opened yet."""
+    rows = [("link", "sheets", "wires", "active [cm2]")]
+    counts, area = 0, 0.0
+    for name, designs in links:
+        if designs is None:
+            rows.append((name, "not opened", "", ""))
+            continue
+        active = sum(design.layout.active.area(design.place.frustum) for design in designs)
+        counts, area = counts + len(designs), area + active
+        rows.append((name, str(len(designs)), str(4 * len(designs)), f"{1e4 * active:.1f}"))
+    rows.append(("all", str(counts), str(4 * counts), f"{1e4 * area:.1f}"))
+    note = "Joints are not swept here, as <code>coneskin design</code> does: a sheet may meet the next link."
+    return f'<div id="coneskin-facts" style="font-size:12px;margin:4px 10px">{_table(rows)}<p>{note}</p></div>'
+
+
+def _radius(value: float) -> str:
+    return "infinite" if math.isinf(value) else f"{1e3 * value:.1f}"
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> str:
+    cells = ("".join(f"<td style='padding-right:8px'>{escape(value)}</td>" for value in row) for row in rows)
+    return f"<table style='font-size:12px'>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
 def flat_drawing(sheet: CutSheet) -> str:

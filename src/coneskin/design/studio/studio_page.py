@@ -10,6 +10,7 @@ import shlex
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,9 @@ import numpy as np
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.design.link_design import LinkMesh, load_link
+from coneskin.design.sheets.cable_way import CABLE_RADIUS, MOUNT_REACH
+from coneskin.design.workshop.jig import jig_collars
+from coneskin.geometry.fit.touch_weights import read_touch_weights
 from coneskin.geometry.pose import Vector
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.view.page_server import PageServer
@@ -30,12 +34,13 @@ from .design_text import (
     electrode_marks,
     flat_drawing,
     legend,
+    robot_facts,
     warning_list,
 )
-from .workbench import Handles, Workbench
+from .workbench import Handles, RobotLinks, Wish, Workbench
 
 if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
+    from coneskin.core.arrays import Floats, Ints
     from coneskin.design.sheets.sheet_design import SheetDesign
 
 #: for the head of the page: a file that is dropped anywhere goes the way of viser's button, which takes one from its
@@ -76,15 +81,16 @@ _HEIGHT_PREFERENCE = 0.1  # by which another height has to be better
 _VIEW_DISTANCE = 1.55  # of the link's largest side
 
 
-def _first_view(designs: Sequence[SheetDesign], rays: RayCaster, corners: Floats) -> tuple[Vector, Vector]:
+def _first_view(designs: Sequence[SheetDesign], rays: RayCaster | None, corners: Floats) -> tuple[Vector, Vector]:
     """Return from where to look, and at what [m]."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     middle, size = 0.5 * (low + high), float((high - low).max())
     ways = _directions()
     worth = np.array([-_HEIGHT_PREFERENCE * (row // _AZIMUTH_COUNT > 0) for row in range(len(ways))])
-    for design in designs:
-        sheet, seam = _seen_shares(design, rays, ways)
-        worth += sheet + _SEAM_WORTH * seam
+    if rays is not None:
+        for design in designs:
+            sheet, seam = _seen_shares(design, rays, ways)
+            worth += sheet + _SEAM_WORTH * seam
     way = ways[int(np.argmax(worth))]  # the first of several that are as good
     x, y, z = (middle + _VIEW_DISTANCE * size * way).tolist()
     at_x, at_y, at_z = middle.tolist()
@@ -127,10 +133,17 @@ def _directions() -> Floats:
 
 
 _LINK_COLOR = (205, 208, 214)
+_SHEET_COLOR = (164, 205, 150)
+_CABLE_COLOR = (55, 65, 81)
+_COLLAR_COLOR = (253, 186, 116)
 _MESH_SUFFIXES = {".stl", ".obj", ".dae", ".ply"}
 _LETTER_SIZE = 1.6  # of viser's own size of letters, 12 pixels
 _SHOWN_FIRST = "lower conductive"  # layer of the flat drawing that says most
 _HANDLE_STEP = 0.5  # mm and deg of the handles
+_SHORTEST = 10.0  # mm along the axis
+_MOST_WIRES = 40
+_ALL_LINKS = "the whole robot"
+_EVEN, _FREE = "all areas alike", "what is free above it"
 
 
 class StudioPage:
@@ -138,8 +151,8 @@ class StudioPage:
 
     Args:
         server: of the page.
-        bench: with the link and its sheets.
-        folder: where the design is written.
+        shown: the workbench of a link; or the links of a robot, of which one is opened after another.
+        folder: where the design is written; of a robot a folder in it for each link.
         overwrite: an earlier design there may be replaced.
         load: makes the workbench of a mesh file that was put onto the page.
     """
@@ -147,97 +160,243 @@ class StudioPage:
     def __init__(
         self,
         server: PageServer,
-        bench: Workbench,
+        shown: Workbench | RobotLinks,
         folder: Path,
         overwrite: bool,
         load: Callable[[LinkMesh], Workbench],
     ) -> None:
-        self._server, self._bench, self._folder, self._overwrite, self._load = server, bench, folder, overwrite, load
+        self._server, self._folder, self._overwrite, self._load = server, folder, overwrite, load
+        self._robot = shown if isinstance(shown, RobotLinks) else None
+        self._bench = shown if isinstance(shown, Workbench) else None
         self._lock = threading.Lock()  # the page's callbacks come from several threads
-        self._handles: list[Any] = []
+        self._held: tuple[int, str] | None = None  # handle that made the last change
         gui = server.gui
+        if self._robot is not None:
+            self._link = gui.add_dropdown("link", [_ALL_LINKS, *self._robot.names], initial_value=_ALL_LINKS)
+            self._link.on_update(lambda _event: self._open())
         self._legend = gui.add_html("")
         self._said = gui.add_html("")
-        self._upload = gui.add_upload_button("another link (STL, OBJ, DAE, PLY), or drop it here", mime_type="*/*")
+        self._upload = gui.add_upload_button(
+            "another link, or a map of touches",
+            mime_type="*/*",
+            hint="STL, OBJ, DAE or PLY; a map is a CSV file with x_mm, y_mm, z_mm, weight; or drop it anywhere",
+        )
         self._upload.on_upload(lambda _event: self._take_upload())
         self._layer = gui.add_dropdown("layer", ["none"], initial_value="none")
         self._layer.on_update(lambda _event: self._draw_flat())
         self._flat = gui.add_html("")
-        self._folder_of_handles = gui.add_folder("handles")
+        self._handles: list[Any] = []  # one folder for each sheet, and the buttons that add one to a side
+        self._place_of_handles = gui.add_folder("sheets")
+        with self._place_of_handles:
+            self._undo = gui.add_button("undo")
+            self._undo.on_click(lambda _event: self._change(lambda bench: bench.undo()))
+        finding = gui.add_folder("find again", expand_by_default=False)
+        with finding:
+            self._wires = gui.add_slider("wires at most", 4, _MOST_WIRES, 4, 8)
+            self._count = gui.add_dropdown("what counts", [_EVEN, _FREE], initial_value=_EVEN)
+            self._find = gui.add_button("find sheets")
+            self._find.on_click(lambda _event: self._find_again())
+        self._collars = gui.add_checkbox("show the collars", False)
+        self._collars.on_update(lambda _event: self._change(lambda _bench: None))
         self._warnings = gui.add_html("")
         self._facts = gui.add_html("")
         self._write = gui.add_button(f"write {folder}")
         self._write.on_click(lambda _event: self._written())
         self._told = gui.add_html("")  # where a person looks who has pressed the button
+        self._of_a_link = (self._layer, self._place_of_handles, finding, self._collars, self._write)
         self._stand()
 
     def _stand(self) -> None:
-        """Draw the link of the workbench, and make a set of handles for each of its sheets."""
-        bench, scene, gui = self._bench, self._server.scene, self._server.gui
+        """Draw the link that is open, or all of a robot, and make the handles."""
+        scene = self._server.scene
         scene.reset()
         scene.set_up_direction("+z")
         light_plainly(scene)
-        vertices = bench.link.mesh.vertices
-        self._rays = RayCaster(bench.link.mesh)
-        self._server.look_from(*_first_view(bench.designs, self._rays, vertices))
-        self._legend.content = legend(bench.fit.tolerance)
-        scene.add_mesh_simple(
-            "/link",
-            vertices.astype("float32"),
-            bench.link.mesh.faces,
-            color=_LINK_COLOR,
-            side="double",
-            flat_shading=True,
-            cast_shadow=False,
-            receive_shadow=False,
+        for of_a_link in self._of_a_link:
+            of_a_link.visible = self._bench is not None
+        if self._bench is None:
+            self._draw_robot()
+        else:
+            self._rays = RayCaster(self._bench.link.mesh)
+            self._server.look_from(*_first_view(self._bench.designs, self._rays, self._bench.link.mesh.vertices))
+            self._legend.content = legend(self._bench.wish.fit.tolerance)
+            self._add_mesh("/link", self._bench.link.mesh.vertices, self._bench.link.mesh.faces, _LINK_COLOR)
+            self._draw()
+        self._make_handles()
+
+    def _add_mesh(self, name: str, vertices: Floats, faces: Ints, colour: tuple[int, int, int], **more: Any) -> None:
+        plain = {"side": "double", "flat_shading": True, "cast_shadow": False, "receive_shadow": False}
+        self._server.scene.add_mesh_simple(name, vertices.astype("float32"), faces, color=colour, **plain | more)
+
+    def _draw_robot(self) -> None:
+        """Draw all links of a robot, with the sheets of those that were opened."""
+        robot, rows = self._robot, []
+        assert robot is not None
+        corners = []
+        for name, pose in robot.poses().items():
+            mesh = robot.link(name).mesh
+            corners.append(pose.apply_all(mesh.vertices))
+            self._add_mesh(f"/robot/{name}", corners[-1], mesh.faces, _LINK_COLOR)
+            bench = robot.opened.get(name)
+            for design in () if bench is None else bench.designs:
+                triangles = pose.apply_all(design.outer_triangles().reshape(-1, 3))
+                faces = np.arange(len(triangles)).reshape(-1, 3)
+                self._add_mesh(f"/robot/{name}/{design.name}", triangles, faces, _SHEET_COLOR)
+            rows.append((name, None if bench is None else bench.designs))
+        self._server.look_from(*_first_view((), None, np.concatenate(corners)))
+        self._legend.content, self._flat.content, self._warnings.content = "", "", ""
+        self._facts.content = robot_facts(rows)
+
+    def _open(self) -> None:
+        """Open the link of a robot that was chosen."""
+        robot, name = self._robot, str(self._link.value)
+        assert robot is not None
+        self._say("" if name in robot.opened or name == _ALL_LINKS else f"looking for sheets on {name} ...")
+        try:
+            bench = None if name == _ALL_LINKS else robot.open(name)
+        except ConeSkinError as exc:
+            self._say(f"{name}: {exc}")
+            return
+        with self._lock:
+            if self._link.value != name:  # another was chosen meanwhile
+                return
+            self._bench, self._held = bench, None
+            self._stand()
+        self._say("" if bench is None else f"{name}: {len(bench.designs)} sheets")
+
+    def _make_handles(self) -> None:
+        for made in self._handles:
+            made.remove()
+        self._handles, bench, gui = [], self._bench, self._server.gui
+        if bench is None:
+            return
+        with self._place_of_handles:
+            for number, handles in enumerate(bench.wish.handles):
+                self._handles.append(gui.add_folder(""))
+                with self._handles[-1]:
+                    self._handles_of(number, handles)
+            sides = [f"side {number}" for number in range(1, len(bench.wish.fit.sheets) + 1)]
+            if sides:
+                adding = gui.add_button_group("add a sheet", sides)
+                adding.on_click(lambda _event: self._change(lambda bench: bench.add(sides.index(adding.value))))
+                self._handles.append(adding)
+        self._name_handles()
+
+    def _name_handles(self) -> None:
+        """Name each set of handles as the sheet that it moves."""
+        bench = self._bench
+        assert bench is not None
+        names = dict(zip(bench.places, (design.name for design in bench.designs), strict=True))
+        for number, handles in enumerate(bench.wish.handles):
+            self._handles[number].label = f"{names.get(number, 'cannot be made')}, on side {handles.side + 1}"
+
+    def _handles_of(self, number: int, handles: Handles) -> None:
+        """Make the sliders of one sheet, and the button that deletes it."""
+        assert self._bench is not None
+        gui, side = self._server.gui, self._bench.wish.fit.sheets[handles.side].frustum
+        longest, widest = round(1e3 * side.height, 1), round(math.degrees(side.wrap), 1)
+        turn = 360.0 if side.wrap >= math.tau else widest
+        length, wrap = (
+            most if value is None else min(round(unit * value, 1), most)
+            for value, unit, most in ((handles.length, 1e3, longest), (handles.wrap, 180.0 / math.pi, widest))
         )
-        for handle in self._handles:
-            handle.remove()
-        self._handles = []
-        with self._folder_of_handles:
-            for number, sheet in enumerate(bench.fit.sheets):
-                self._handles += self._handles_of(gui, number, sheet.frustum.height, sheet.frustum.wrap)
-        self._draw()
+        sliders = {
+            "along [mm]": gui.add_slider(
+                "along [mm]",
+                0.0,
+                max(longest - _SHORTEST, 1.0),
+                _HANDLE_STEP,
+                min(round(1e3 * handles.along, 1), longest),
+            ),
+            "length [mm]": gui.add_slider("length [mm]", _SHORTEST, longest, _HANDLE_STEP, length),
+            "wrap [deg]": gui.add_slider("wrap [deg]", 30.0, widest, 0.1, wrap),
+            "seam [deg]": gui.add_slider("seam [deg]", 0.0, turn, _HANDLE_STEP, round(math.degrees(handles.seam), 1)),
+        }
+        made, moves = self._handles, dict.fromkeys(sliders, 0)
 
-    def _handles_of(self, gui: Any, number: int, height: float, wrap: float) -> list[Any]:
-        name = f"sheet {number + 1}: "
-        room, widest = math.floor(1e3 * height - 10.0), round(math.degrees(wrap), 1)
-        turn = 360.0 if wrap >= 2.0 * math.pi else widest
-        sliders = [
-            gui.add_slider(name + "end 1 [mm off]", 0.0, float(max(room, 1)), _HANDLE_STEP, 0.0),
-            gui.add_slider(name + "end 2 [mm off]", 0.0, float(max(room, 1)), _HANDLE_STEP, 0.0),
-            gui.add_slider(name + "wrap [deg]", 30.0, widest, 0.1, widest),
-            gui.add_slider(name + "seam [deg]", 0.0, turn, _HANDLE_STEP, 0.0),
-        ]
-
-        def changed(_event: Any) -> None:
-            end1, end2, covered, seam = (float(slider.value) for slider in sliders)
-            full = None if covered >= widest else math.radians(covered)
+        def moved(name: str) -> None:
+            moves[name] += 1
+            mine = moves[name]
             with self._lock:
-                self._bench.handle(number, Handles(1e-3 * end1, 1e-3 * end2, full, math.radians(seam)))
+                bench = self._bench
+                if mine != moves[name] or bench is None or self._handles is not made:
+                    return  # a later move of it waits, or these handles are no more
+                along, length, wrap, seam = (float(slider.value) for slider in sliders.values())
+                whole = length >= longest, wrap >= widest
+                wanted = Handles(
+                    handles.side,
+                    1e-3 * along,
+                    None if whole[0] else 1e-3 * length,
+                    None if whole[1] else math.radians(wrap),
+                    math.radians(seam),
+                )
+                bench.handle(number, wanted, again=self._held == (number, name))
+                self._held = number, name
                 self._draw()
+                self._name_handles()
 
-        for slider in sliders:
-            slider.on_update(changed)
-        return sliders
+        for name, slider in sliders.items():
+            slider.on_update(lambda _event, name=name: moved(name))
+        gui.add_button("delete").on_click(lambda _event: self._change(lambda bench: bench.delete(number)))
+
+    def _change(self, change: Callable[[Workbench], None]) -> None:
+        """Change the sheets by a button, and make their handles anew."""
+        with self._lock:
+            if self._bench is None:
+                return
+            self._held = None
+            try:
+                change(self._bench)
+            except ConeSkinError as exc:
+                self._say(str(exc))
+                return
+            self._say("")
+            self._draw()
+            self._make_handles()
+
+    def _find_again(self) -> None:
+        bench, wires = self._bench, int(self._wires.value)
+        if bench is None:
+            return
+        search = {name: value for name, value in bench.wish.search.items() if name not in ("weights", "exposure")}
+        search |= {"max_wires": wires, "max_sheets": wires // 4, "exposure": self._count.value == _FREE}
+        if self._count.value not in (_EVEN, _FREE):
+            search["weights"] = self._map
+        self._say("looking for sheets ...")
+        try:
+            wish = Wish.found(bench.link, bench.options, **search)
+        except ConeSkinError as exc:
+            self._say(str(exc))
+            return
+        self._change(lambda bench: bench.change(wish))
+        self._say(f"{len(wish.handles)} sheets")
 
     def _draw(self) -> None:
-        """Draw the sheets as they are now, on the link and in the panel."""
+        """Draw the sheets as they are now, with their cables, on the link and in the panel."""
         bench, scene = self._bench, self._server.scene
+        assert bench is not None
+        tolerance = bench.wish.fit.tolerance
         with self._server.together():
             scene.add_frame("/sheets", show_axes=False)  # replaces the one before, and all that was below it
             for design in bench.designs:
                 name = f"/sheets/{design.name}"
-                for number, band in enumerate(deviation_bands(self._rays, design.place, bench.fit.tolerance)):
-                    scene.add_mesh_simple(
-                        f"{name}/band {number}",
-                        band.vertices.astype("float32"),
-                        band.faces,
-                        color=band.colour,
-                        side="double",
-                        cast_shadow=False,
-                        receive_shadow=False,
+                for number, band in enumerate(deviation_bands(self._rays, design.place, tolerance)):
+                    self._add_mesh(f"{name}/band {number}", band.vertices, band.faces, band.colour, flat_shading=False)
+                cable = design.way.points + CABLE_RADIUS * design.way.normals
+                strands = np.stack([cable[:-1], cable[1:]], axis=1).astype("float32")
+                scene.add_line_segments(f"{name}/cable", strands, colors=_CABLE_COLOR, thickness=2.0 * CABLE_RADIUS)
+                for what, at in (("tie", design.way.tie), ("connector", len(cable) - 1)):
+                    scene.add_icosphere(
+                        f"{name}/{what}", MOUNT_REACH / 2, _CABLE_COLOR, position=cable[at], cast_shadow=False
                     )
+                others = [other for other in bench.designs if other is not design]
+                made = jig_collars(design, bench.link.mesh, (), others)[0] if self._collars.value else ()
+                for collar in made:
+                    pose = design.place.link_frustum @ collar.pose
+                    for part in collar.parts:
+                        corners, faces = pose.apply_all(part.surface.vertices), np.asarray(part.surface.faces)
+                        at_end = f"{name}/collar {collar.slug(part)}"
+                        self._add_mesh(at_end, corners, faces, _COLLAR_COLOR, opacity=0.6)
                 for mark in electrode_marks(design):
                     colour, line = ELECTRODE_COLOURS[mark.letter], f"{name}/{mark.letter}"
                     scene.add_line_segments(line, mark.segments, colors=colour, thickness=0.002)
@@ -251,7 +410,7 @@ class StudioPage:
                             anchor="center-center",
                         )
         self._facts.content = design_facts(bench.designs)
-        self._warnings.content = warning_list(bench.warnings() or ([bench.fit.reason] if bench.fit.reason else []))
+        self._warnings.content = warning_list(bench.warnings())
         layers = [f"{design.name}: {cut.name}" for design in bench.designs for cut in design.cuts] or ["none"]
         if list(self._layer.options) != layers:
             self._layer.options = layers
@@ -260,7 +419,7 @@ class StudioPage:
 
     def _draw_flat(self) -> None:
         chosen = str(self._layer.value)
-        for design in self._bench.designs:
+        for design in () if self._bench is None else self._bench.designs:
             for cut in design.cuts:
                 if f"{design.name}: {cut.name}" == chosen:
                     self._flat.content = flat_drawing(cut)
@@ -268,11 +427,14 @@ class StudioPage:
         self._flat.content = ""
 
     def _take_upload(self) -> None:
-        """Find the sheets of a mesh file that was put onto the page."""
+        """Find the sheets of a mesh file that was put onto the page, or take a map of touches."""
         file = self._upload.value
         suffix = Path(file.name).suffix.lower()
+        if suffix == ".csv":
+            self._take_map(file)
+            return
         if suffix not in _MESH_SUFFIXES:
-            self._say(f"{file.name} is no {', '.join(sorted(_MESH_SUFFIXES))} file")
+            self._say(f"{file.name} is no {', '.join(sorted(_MESH_SUFFIXES))} or .csv file")
             return
         self._say(f"looking for sheets in {file.name} ...")
         try:
@@ -288,21 +450,38 @@ class StudioPage:
         with self._lock:
             if self._upload.value is not file:  # another was dropped meanwhile, and is the one that is wanted
                 return
-            self._bench = bench
+            self._bench, self._held = bench, None
             self._stand()
-        self._say(f"{file.name}: {len(bench.fit.sheets)} sheets")
+        self._say(f"{file.name}: {len(bench.designs)} sheets")
+
+    def _take_map(self, file: Any) -> None:
+        """Take a map of touches, by which sheets may then be found again."""
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "map.csv"
+                path.write_bytes(file.content)
+                self._map = replace(read_touch_weights(path), name=file.name)
+        except (ConeSkinError, OSError) as exc:
+            self._say(f"{file.name}: {exc}")
+            return
+        self._count.options = [_EVEN, _FREE, file.name]
+        self._count.value = file.name
+        self._say(f'{file.name}: find the sheets again by it, with the button "find sheets"')
 
     def _written(self) -> None:
         self._write.disabled = True
         self._tell(f"writing {self._folder} ... (drawings and pictures take some seconds)")
         try:
             with self._lock:
-                files = self._bench.write(self._folder, self._overwrite)
+                bench = self._bench
+                assert bench is not None
+                folder = self._folder if self._robot is None else self._folder / bench.link.name
+                files = bench.write(folder, self._overwrite)
         except ConeSkinError as exc:
             self._tell(str(exc))
         else:
-            next_step = f"coneskin init {shlex.quote(str(self._folder))} --simulated"
-            self._tell(f"written: {len(files)} files in {self._folder}; next: {next_step}")
+            next_step = f"coneskin init {shlex.quote(str(folder))} --simulated"
+            self._tell(f"written: {len(files)} files in {folder}; next: {next_step}")
         finally:
             self._write.disabled = False
 

@@ -21,6 +21,7 @@ from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.pose import Pose
 from coneskin.geometry.solid import shell_surface, widest_nearby, without_undercut
 
 from .link_excess import LinkExcess
@@ -147,6 +148,7 @@ class Collar:
         play: angle by which it can be turned until its lip meets a part of the link on the other side [rad]; None
             where the link does not show its azimuth.
         before: from the outermost face of the link to the edge of the lip, along the axis [m]; None without a mesh.
+        pose: of its parts, as they are printed, about the sheet.
     """
 
     end: int
@@ -156,6 +158,7 @@ class Collar:
     stopped: bool
     play: float | None
     before: float | None
+    pose: Pose
 
     def slug(self, part: _CollarPart) -> str:
         """Return the name of the file of a part."""
@@ -257,7 +260,10 @@ class _Builder:
         play = _lip_play(self.link, lips, wanted, self.plan.clearance, facets)
         reached = self.flush and longest > wanted - 1e-9
         before = None if self.room is None else self.room - longest
-        return Collar(self.end, tuple(parts), longest, reached, stopped, play, before)
+        turned = Pose.from_xyz_rpy(
+            (0.0, 0.0, self.step - self.sign * self.plan.reach), (math.pi * (self.end == 1), 0, 0)
+        )
+        return Collar(self.end, tuple(parts), longest, reached, stopped, play, before, turned)
 
     def _spans(self) -> list[tuple[float, float, int]]:
         """Return start, end and number of columns of each part."""
