@@ -19,6 +19,7 @@ from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
+from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import StopMonitor
 from coneskin.robot.ur.rtde_codec import decode_state
 from coneskin.robot.ur.rtde_connection import StateReader
@@ -164,12 +165,12 @@ def follow(
     """
     at = bisect_left(samples, (command, 0.0))
     speed = samples[at - 1][1]
-    monitor = StopMonitor(command, speed, (StopPath.DRIVER,), 9.0, 9.0, 0.01)
+    monitor = StopMonitor(command, speed, (StopPath.DRIVER,), MonitoringLimits(escalate=9.0), 9.0)
     for time_, value in samples[at:]:
         monitor.sample(time_, value)
-        if monitor.standing_at is not None:
+        if monitor.course.standing_at is not None:
             break
-    if monitor.slowed_at is None or monitor.standing_at is None:
+    if monitor.course.slowed_at is None or monitor.course.standing_at is None:
         raise RuntimeError(f"{mode}: the arm did not stand after a stop by the {by}")
     arrival = bisect_left(arrivals, since)
     return {
@@ -177,6 +178,6 @@ def follow(
         "by": by,
         "speed": speed,
         "command_came": arrivals[arrival] - command if arrival < len(arrivals) else math.nan,
-        "command_slower": monitor.slowed_at - command,
-        "command_standing": monitor.standing_at - command,
+        "command_slower": monitor.course.slowed_at - command,
+        "command_standing": monitor.course.standing_at - command,
     }

@@ -25,57 +25,31 @@ _LIMIT_MARGIN = 0.02
 REACTION_TIME = 0.01
 
 
-@dataclass(frozen=True, slots=True)
-class JointLimits:
-    """Limits of the joints, with a margin.
+def blocked_joints(
+    model: ArmModel, braking: float, q: Sequence[float], qd: Sequence[float], wanted: Sequence[float]
+) -> list[int]:
+    """Return the indices of joints that could no longer brake before their limit if they moved as wanted.
 
-    Attributes:
-        lower: lowest joint positions, margin included [rad].
-        upper: highest joint positions, margin included [rad].
-        speed: highest joint speeds [rad/s].
+    Args:
+        model: the arm.
         braking: deceleration available to a joint [rad/s^2].
-        reach: upper bound of the distance of any point of the bare arm from each joint's axis [m].
+        q: joint positions [rad].
+        qd: present joint speeds [rad/s].
+        wanted: wanted joint speeds [rad/s]; may be shorter than q, the joints beyond stand.
     """
-
-    lower: Joints
-    upper: Joints
-    speed: Joints
-    braking: float
-    reach: Joints
-
-    @classmethod
-    def of(cls, model: ArmModel, braking: float) -> JointLimits:
-        """Return the limits of an arm whose joints brake with a deceleration [rad/s^2]."""
-        lower, upper = model.joint_lower, model.joint_upper
-        return cls(
-            lower=tuple(limit + _LIMIT_MARGIN for limit in lower),
-            upper=tuple(limit - _LIMIT_MARGIN for limit in upper),
-            speed=model.joint_speed,
-            braking=braking,
-            reach=reach(model),
-        )
-
-    def blocked(self, q: Sequence[float], qd: Sequence[float], wanted: Sequence[float]) -> list[int]:
-        """Return the indices of joints that could no longer brake before their limit if they moved as wanted.
-
-        Args:
-            q: joint positions [rad].
-            qd: present joint speeds [rad/s].
-            wanted: wanted joint speeds [rad/s]; may be shorter than q, the joints beyond stand.
-        """
-        found = []
-        for i, speed in enumerate(wanted):
-            if speed > 0.0:
-                room = self.upper[i] - q[i]
-                fast = qd[i] if qd[i] > speed else speed
-            elif speed < 0.0:
-                room = q[i] - self.lower[i]
-                fast = -qd[i] if -qd[i] > -speed else -speed
-            else:
-                continue
-            if not fast * (REACTION_TIME + fast / (2.0 * self.braking)) <= room:
-                found.append(i)
-        return found
+    found = []
+    for i, speed in enumerate(wanted):
+        if speed > 0.0:
+            room = model.joint_upper[i] - _LIMIT_MARGIN - q[i]
+            fast = qd[i] if qd[i] > speed else speed
+        elif speed < 0.0:
+            room = q[i] - (model.joint_lower[i] + _LIMIT_MARGIN)
+            fast = -qd[i] if -qd[i] > -speed else -speed
+        else:
+            continue
+        if not fast * (REACTION_TIME + fast / (2.0 * braking)) <= room:
+            found.append(i)
+    return found
 
 
 def reach(model: ArmModel) -> Joints:

@@ -122,7 +122,7 @@ class ArmSupervisor:
         if not self.backup_ready:
             process = "the arm's driver" if self.internal_control else "the guard watchdog"
             blockers.append(f"{process} is not ready")
-        if self._needs_slider and not self.speed_reduction.knows(now):
+        if self._needs_slider and self.speed_reduction.known(now) is None:
             blockers.append("the position of the controller's speed slider is not known")
         if self.heartbeat is not None and (blocker := self.heartbeat.blocker()):
             blockers.append(blocker)
@@ -188,27 +188,26 @@ class ArmSupervisor:
 
     def touch(self, now: float, contact: Contact, began: bool, out: Outputs) -> None:
         """Take a touch that has begun, or has changed, at a host time [s]."""
-        phase, touches = self.phase, self._touches
+        phase, touches, motion = self.phase, self._touches, self._motion
         if phase is Phase.ACTIVE:
             touches.begin(contact, self._speed)
-            reaction = self._reaction = touches.update(contact)
-            if reaction.kind == "slow" and self.speed_reduction.begin(
+        reaction = touches.update(contact)
+        if phase is Phase.ACTIVE:
+            self._reaction, slow = reaction, self.speed_reduction
+            if reaction.kind == "slow" and slow.begin(
                 now, self.state, reaction, self._limits, [contact.on_link()], out
             ):
                 self._follow(now, Cue.SLOWED, "", out)
-            else:
-                self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
-            return
-        reaction, motion = touches.update(contact), self._motion
-        if phase is Phase.SLOWED and reaction.kind != "slow":
+                return
+        elif phase is Phase.SLOWED and reaction.kind != "slow":
             self._reaction = reaction
-            self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
         elif motion is not None and motion.how == "push":  # touches are what that follows
-            if reaction.kind not in ("slow", "comply", self._reaction.kind):
-                self._reaction = reaction
-                self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
-        elif phase is Phase.RETREATING and began:
-            self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
+            if reaction.kind in ("slow", "comply", self._reaction.kind):
+                return
+            self._reaction = reaction
+        elif not (phase is Phase.RETREATING and began):
+            return
+        self._follow(now, Cue.TOUCHED, TOUCH_CAUSE, out, contact)
 
     def feed_contacts(self, now: float, contacts: Sequence[Contact], out: Outputs) -> None:
         """Take what the newest frames say of every touch that there is, at a host time [s]."""

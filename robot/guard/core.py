@@ -417,7 +417,11 @@ class GuardCore:
         if arm is not None:
             if arm.phase is not Phase.STARTING and (trouble := arm.state_age.trouble(fair)):
                 self._add_fault(now, trouble, out)
-            self._check_companions(now, arm, out)
+            for why, paths in self._companions.poll(fair):  # silent: stop by a path that does not need it
+                if arm.phase is not Phase.STARTING:
+                    self._add_fault(now, why, out)
+                    if paths:
+                        arm.lose(paths, now, for_good=False)
             if arm.phase is Phase.RETREATING and (stale := self._stale(now) or arm.state_age.stale(now)):
                 arm.abandon_motion(now, stale, out)  # what supervises it is too old
             arm.poll(now, fair, out)
@@ -433,14 +437,6 @@ class GuardCore:
             arm.release(self._activation.number, out)
         elif step is ActivationStep.WITHDRAW and arm is not None:
             arm.withdraw(out)
-
-    def _check_companions(self, now: float, arm: ArmSupervisor, out: Outputs) -> None:
-        """Stop the arm where a process beside the guard has fallen silent, by a path that does not need it."""
-        for why, paths in self._companions.poll(self._fair):
-            if self.phase is not Phase.STARTING:
-                self._add_fault(now, why, out)
-                if paths:
-                    arm.lose(paths, now, for_good=False)
 
     def _activate(self, now: float, out: Outputs) -> None:
         self._reopened = False

@@ -215,17 +215,13 @@ class GuardLoop:
 
     def _open(self) -> None:
         ports = self._ports
-        self._watch(ports.session, _SESSION)
-        self._watch(ports.driver, _DRIVER)
-        self._watch(ports.watchdog, _WATCHDOG)
-        self._watch(ports.second, _SECOND)
-        self._watch(ports.reader, _READER)
-        self._watch(ports.slider, _SLIDER)
-        self._watch(ports.heartbeat, _HEARTBEAT)
+        helpers = (ports.driver, _DRIVER), (ports.watchdog, _WATCHDOG), (ports.second, _SECOND)
+        controller = (ports.reader, _READER), (ports.slider, _SLIDER), (ports.heartbeat, _HEARTBEAT)
+        stops = [(sock, _STOPS) for sock in (ports.stops.sockets().values() if ports.stops else ())]
+        for item, bit in ((ports.session, _SESSION), *helpers, *controller, *stops):
+            self._watch(item, bit)
         if ports.source is not None:
             self._watch_skin(ports.source)
-        for sock in ports.stops.sockets().values() if ports.stops else ():
-            self._watch(sock, _STOPS)
         for what, why in ports.absent.items():
             self._feed(BlockKind.ABSENT, encode_loss(what, why))
 

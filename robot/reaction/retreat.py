@@ -22,7 +22,7 @@ from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
 from coneskin.robot.arm.kinematics import PlacedPoint, place_point
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.vectors import dot, minus
-from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, JointLimits, Workspace
+from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, Workspace, blocked_joints, reach
 
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
@@ -53,7 +53,7 @@ class RetreatPlan:
         model: the arm.
         tracks: one for each touched point.
         reaction: the settings.
-        limits: of the joints.
+        reach: of the arm, from each joint's axis [m].
         start_time: of the touch [s].
         space: the room that the arm has, or None.
         sweep: where the whole arm was when the motion began; None where its way is not bounded.
@@ -62,7 +62,7 @@ class RetreatPlan:
     model: ArmModel
     tracks: tuple[_Track, ...]
     reaction: Reaction
-    limits: JointLimits
+    reach: Joints
     start_time: float
     space: Workspace | None = None
     sweep: ArmSweep | None = None
@@ -108,8 +108,7 @@ def plan_retreat(
         start, (nx, ny, nz), _ = place_point(model, state.q, contact.link, contact.point, contact.normal)
         away = (-nx / length, -ny / length, -nz / length)
         tracks.append(_Track(contact.link, contact.point, away, start))
-    limits = JointLimits.of(model, reaction.acceleration)
-    plan = RetreatPlan(model, tuple(tracks), reaction, limits, state.time, space, sweep)
+    plan = RetreatPlan(model, tuple(tracks), reaction, reach(model), state.time, space, sweep)
     first = retreat_step(plan, ArmState(state.time, state.q))  # from a standstill: the arm stops first
     return first if isinstance(first, Done) else plan
 
@@ -121,7 +120,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         plan: of this retreat.
         state: the arm as measured.
     """
-    reaction, limits = plan.reaction, plan.limits
+    reaction = plan.reaction
     q, qd = state.q, state.qd or (0.0,) * len(state.q)
     if not math.isfinite(sum(q)):
         return Done(f"joint positions must be finite, got {q} rad")
@@ -140,9 +139,9 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
         return Done(f"{why}, before the touched one had moved {wanted_way:g} mm", progress)
     locked: list[int] = []
     while away >= MIN_PROGRESS:
-        speed, clipped = _speed(reaction, limits, speeds, away, left, room)
+        speed, clipped = _speed(plan, speeds, away, left, room)
         wanted = [speed * value for value in speeds]
-        blocked = limits.blocked(q, qd, wanted)
+        blocked = blocked_joints(plan.model, reaction.acceleration, q, qd, wanted)
         if not blocked:
             break
         locked += blocked
@@ -154,21 +153,22 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     if damping > DAMPING_FLOOR:
         clipped += ("singularity",)
     wanted += [0.0] * (len(q) - len(wanted))
-    if plan.space is not None and (why := plan.space.obstruction(q, wanted, limits.braking)):
+    if plan.space is not None and (why := plan.space.obstruction(q, wanted, reaction.acceleration)):
         return Done(why, progress)
     return JointVelocity(tuple(wanted), reaction.acceleration, speed * away, progress, clipped)
 
 
 def _speed(
-    reaction: Reaction, limits: JointLimits, speeds: Sequence[float], away: float, left: float, room: float
+    plan: RetreatPlan, speeds: Sequence[float], away: float, left: float, room: float
 ) -> tuple[float, tuple[str, ...]]:
     """Return the speed to want of the touched point [m/s], and the limits that keep it below the one that is set."""
+    reaction, braking = plan.reaction, plan.reaction.acceleration
     leading = over = arm = 0.0
-    for value, most, reach in zip(speeds, limits.speed, limits.reach, strict=False):
+    for value, most, far in zip(speeds, plan.model.joint_speed, plan.reach, strict=False):
         size = value if value >= 0.0 else -value
         leading = size if size > leading else leading
         over = size / most if size / most > over else over
-        arm += size * reach
+        arm += size * far
     speed = reaction.speed
     clipped: tuple[str, ...] = ()
     if speed * over > 1.0:
@@ -176,12 +176,12 @@ def _speed(
     if speed * arm > reaction.arm_speed:
         speed, clipped = reaction.arm_speed / arm, ("arm speed",)
     # braking takes speed^2 away leading / (2 a) plus the distance during the reaction time: no more than what is left
-    wait = limits.braking * REACTION_TIME / leading
-    ending = math.sqrt(wait * wait + 2.0 * limits.braking * left / (away * leading)) - wait
+    wait = braking * REACTION_TIME / leading
+    ending = math.sqrt(wait * wait + 2.0 * braking * left / (away * leading)) - wait
     if speed > ending:
         speed, clipped = ending, ("distance",)
     if room < math.inf:  # the same for the point of the arm that moves farthest
-        ending = math.sqrt(wait * wait + 2.0 * limits.braking * room / (arm * leading)) - wait
+        ending = math.sqrt(wait * wait + 2.0 * braking * room / (arm * leading)) - wait
         if speed > ending:
             speed, clipped = ending, ("arm distance",)
     return speed, clipped

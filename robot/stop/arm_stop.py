@@ -66,9 +66,7 @@ class ArmStop:
         if self._order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
         budget = limits.stop_budget(speed or 0.0, deceleration)
-        self._monitor = StopMonitor(
-            now, speed, self._order, limits.escalate, budget, limits.standstill, limits.arm_silence
-        )
+        self._monitor = StopMonitor(now, speed, self._order, limits, budget)
         self.watch.end()
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool) -> None:
@@ -106,10 +104,10 @@ class ArmStop:
         stop = self._monitor
         if stop is None:
             return False, False
-        before = stop.slowed_at
+        before = stop.course.slowed_at
         stop.sample(state.time, state.speed, measured_at)
-        slows = before is None and stop.slowed_at is not None and not stop.rippled
-        if stop.standing_at is None:
+        slows = before is None and stop.course.slowed_at is not None and not stop.use.rippled
+        if stop.course.standing_at is None:
             return slows, False
         self.first_was_enough = stop.used == [self._first]
         self._monitor = None

@@ -87,10 +87,6 @@ class StandstillHold:
         self._stop.begin(now, speed, self._deceleration)
         self.stopping, self.stands = True, False
 
-    def rest(self) -> None:
-        """Take what has come and do nothing more: the arm is guarded."""
-        self._read()
-
     def append(self, command: StopProgram | EndReaction | UseStopPath, /) -> None:
         """Send a stop by one path, or by ``COMMAND`` where its connection is not there."""
         assert isinstance(command, UseStopPath)
@@ -103,7 +99,7 @@ class StandstillHold:
         Returns:
             whether there is an outcome to report: ``stands`` has become true, or a stop has failed.
         """
-        states, now = self._read(), self._clock()
+        states, now = self.rest(), self._clock()
         if self.stopping:
             return self._continue(states, now)
         watch = self._stop.watch
@@ -169,8 +165,12 @@ class StandstillHold:
             self.reader = self._driver.state_reader(self._connections.host, _CONNECT_TIMEOUT).__enter__()
         self._opened = self._clock()
 
-    def _read(self) -> list[tuple[ControllerState, float]]:
-        """Return the fresh states that have come, oldest first, and when each was measured [s], without waiting."""
+    def rest(self) -> list[tuple[ControllerState, float]]:
+        """Take what has come, and do nothing more while the arm is guarded.
+
+        Returns:
+            the fresh states, oldest first, and when each was measured [s].
+        """
         states = []
         try:
             for payload in [] if self.reader is None else self.reader.read():

@@ -84,7 +84,9 @@ class _GuardWatchdog:
             inputs.append(reader)
         wait_readable(inputs, timeout)
         now, hold = self._clock(), self._hold
-        self._beat(now)
+        if now - self._beaten >= BEAT_PERIOD:
+            self._beaten = now
+            self._guard.send(self._sign)
         if LEAVE in self._session.receive() or self._session.closed:
             self._left_at = min(self._left_at, now)
         for message in self._guard.receive():
@@ -121,12 +123,6 @@ class _GuardWatchdog:
                 self._session.send(encode_json({"stands": False}))
             return False
         return hold.stopping or not (gone and self._left_at < math.inf and (hold.stands or hold.failed))
-
-    def _beat(self, now: float) -> None:
-        """Send a heartbeat where one is due at a time [s]."""
-        if now - self._beaten >= BEAT_PERIOD:
-            self._beaten = now
-            self._guard.send(self._sign)
 
 
 def main(arguments: list[str]) -> int:

@@ -8,14 +8,43 @@ read. Only where no sample arrives at all does the host's clock count.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 from coneskin.robot.driver.values import StopPath
+
+from .limits import MonitoringLimits
 
 STANDSTILL_SAMPLES = 5  #: samples in a row below the standstill speed that count as standing
 PROTECTIVE_PATIENCE = 4.0  #: times the patience for which a protective stop is left to work
 _SPEED_DROP = 0.05  # rad/s; a drop by this much, or by a tenth, is a slowdown and not noise of the measurement
 _MAX_STALL_DROP = 0.01  # rad/s; a slowdown by less in a path's patience has ended: a program has replaced the stop's
 _SPEED_RISE = 0.1  # rad/s above the lowest speed since the slowdown: something new moves the arm
+
+
+@dataclass(frozen=True, slots=True)
+class _Course:
+    """Course of one stop, by measured joint speed."""
+
+    arrived: float  # when the newest sample was read [s]
+    newest: float  # when it was measured [s]
+    top: float | None  # highest speed until it slowed down [rad/s]; None where none is known
+    slowed_at: float | None = None  # when the measured speed first showed a slowdown
+    lowest: float = math.inf  # speed since then
+    mark: float = math.inf  # speed at which the slowdown was last seen to go on
+    marked_at: float = -math.inf
+    undone: bool = False  # something has undone a stop that had begun to work
+    steady: int = 0  # samples in a row below the standstill speed
+    standing_at: float | None = None  # when the arm was first seen standing
+
+
+@dataclass(frozen=True, slots=True)
+class _PathUse:
+    """Use of the newest stop path."""
+
+    path: StopPath | None
+    until: float  # when the next path is used where nothing slows down [s]
+    deadline: float  # ... slowdown or not
+    rippled: bool = False  # the arm has become faster again meanwhile
 
 
 class StopMonitor:
@@ -25,55 +54,36 @@ class StopMonitor:
         now: when the stop was commanded [s].
         speed: largest joint speed then [rad/s]; None where it is not known.
         paths: those that there are, the first of which has been used.
-        patience: without slowdown for this long, the next path is used [s].
+        limits: of the monitoring.
         budget: time after which the arm should stand; beyond it a slowdown is no reason to wait, and the protective
             stop is next [s].
-        standstill: joint speed below which the arm stands [rad/s].
-        silence: without any sample for this long, the host's clock counts [s].
 
     Attributes:
-        slowed_at: when the measured speed first showed a slowdown, or None.
-        standing_at: when the arm was first seen standing, or None.
+        course: of the stop, as measured.
+        use: of the newest path.
         used: the paths used so far, each once.
         rounds: how often all of them have been used.
-        rippled: True where the arm has become faster again since the newest path was used.
     """
 
     def __init__(
-        self,
-        now: float,
-        speed: float | None,
-        paths: tuple[StopPath, ...],
-        patience: float,
-        budget: float,
-        standstill: float,
-        silence: float = 0.0,
+        self, now: float, speed: float | None, paths: tuple[StopPath, ...], limits: MonitoringLimits, budget: float
     ) -> None:
-        self._top = speed
-        self._paths = tuple(path for path in paths if path is not StopPath.DRIVER)  # its stop is not repeated
+        self._began, self._limits, self._budget = now, limits, budget
         self._alone = StopPath.DRIVER in paths  # no program but ours moves the arm
-        self._undone = False  # something has undone a stop that had begun to work
+        self._paths = tuple(path for path in paths if path is not StopPath.DRIVER)  # its stop is not repeated
         self._left = list(paths[1:])
-        self._patience = patience
-        self._standstill = standstill
-        self._silence = silence
-        self._began = self._newest = self._arrived = now
-        self._next = now + patience * (PROTECTIVE_PATIENCE if paths[:1] == (StopPath.PROTECTIVE,) else 1.0)
-        self._budget = budget
-        self._deadline = now + budget
-        self._steady = 0
-        self._lowest = math.inf  # speed since it slowed down
-        seconds = budget - PROTECTIVE_PATIENCE * patience  # that the stop takes as commanded
-        due = _MAX_STALL_DROP if not speed or seconds <= 0.0 else 0.25 * speed / seconds * patience
+        seconds = budget - PROTECTIVE_PATIENCE * limits.escalate  # that the stop takes as commanded
+        due = _MAX_STALL_DROP if not speed or seconds <= 0.0 else 0.25 * speed / seconds * limits.escalate
         self._stall_drop = min(_MAX_STALL_DROP, due)
-        self._mark = math.inf  # speed at which the slowdown was last seen to go on
-        self._marked_at = now
+        self.course = _Course(now, now, speed)
+        path = paths[0] if paths else None
+        self.use = _PathUse(path, now + self._patience(path), now + budget)
         self.used = list(paths[:1])
         self.rounds = 0
-        self.rippled = False
-        self._current = paths[0] if paths else None
-        self.slowed_at: float | None = None
-        self.standing_at: float | None = None
+
+    def _patience(self, path: StopPath | None) -> float:
+        """Return for how long a path is left to work where nothing slows down [s]."""
+        return self._limits.escalate * (PROTECTIVE_PATIENCE if path is StopPath.PROTECTIVE else 1.0)
 
     def sample(self, time: float, speed: float, measured_at: float | None = None) -> None:
         """Take the speed of a fresh state (``state_age``).
@@ -84,60 +94,55 @@ class StopMonitor:
             measured_at: host time at which it was measured [s]; by default when it was read. What was measured before
                 the stop was commanded says nothing about it.
         """
-        self._arrived = time
+        before, patience, standstill = self.course, self._limits.escalate, self._limits.standstill
         measured_at = time if measured_at is None else measured_at
         if measured_at < self._began:
+            self.course = replace(before, arrived=time)
             return
-        self._newest = measured_at
-        if self._top is None or (speed > self._top and self.slowed_at is None):
-            self._top = speed  # it may still have been speeding up when the stop was commanded
-        slower = self._top - speed >= min(_SPEED_DROP, 0.1 * self._top)
-        if self.slowed_at is None and (slower or speed < self._standstill):
-            self.slowed_at, self._lowest, self._mark = time, speed, math.inf
-        self._lowest = min(self._lowest, speed)
-        if self.slowed_at is not None and speed > self._lowest + _SPEED_RISE:
-            self.slowed_at, self._top, self._undone = None, speed, True
-            if not self.rippled:  # once for each path: an arm that shakes must not postpone the next one for ever
-                self.rippled = True
-                self._next = max(self._next, measured_at + self._patience)
-                self._deadline = measured_at + self._budget
-        elif self.slowed_at is not None and speed > _SPEED_RISE:
-            self._see_stall(measured_at, speed)
-        self._steady = self._steady + 1 if speed < self._standstill else 0
-        if self._steady >= STANDSTILL_SAMPLES and self.standing_at is None:
-            self.standing_at = time
-        elif speed >= self._standstill:
-            self.standing_at = None
-
-    def _see_stall(self, measured_at: float, speed: float) -> None:
-        """Take the slowdown for over where the arm goes on at a steady speed instead of braking to the end."""
-        if speed <= self._mark - self._stall_drop:
-            self._mark, self._marked_at = speed, measured_at
-        elif measured_at - self._marked_at > self._patience:
-            self.slowed_at, self._top, self._undone = None, speed, True
-
-    def expire_current_path(self, now: float) -> None:
-        """Use the next path at the next look, slowdown or not: the current one is known to be broken."""
-        self._next = self._newest = now
-        self.slowed_at = None
+        top, slowed_at, undone = before.top, before.slowed_at, before.undone
+        lowest, mark, marked_at = before.lowest, before.mark, before.marked_at
+        if top is None or (speed > top and slowed_at is None):
+            top = speed  # it may still have been speeding up when the stop was commanded
+        if slowed_at is None and (top - speed >= min(_SPEED_DROP, 0.1 * top) or speed < standstill):
+            slowed_at, lowest, mark = time, speed, math.inf
+        lowest = min(lowest, speed)
+        if slowed_at is not None and speed > lowest + _SPEED_RISE:
+            slowed_at, top, undone = None, speed, True
+            use = self.use
+            if not use.rippled:  # once for each path: an arm that shakes must not postpone the next one for ever
+                until = max(use.until, measured_at + patience)
+                self.use = _PathUse(use.path, until, measured_at + self._budget, rippled=True)
+        elif slowed_at is not None and speed > _SPEED_RISE:
+            if speed <= mark - self._stall_drop:
+                mark, marked_at = speed, measured_at
+            elif measured_at - marked_at > patience:  # it goes on at a steady speed instead of braking to the end
+                slowed_at, top, undone = None, speed, True
+        steady, standing_at = before.steady + 1 if speed < standstill else 0, before.standing_at
+        if steady >= STANDSTILL_SAMPLES and standing_at is None:
+            standing_at = time
+        elif speed >= standstill:
+            standing_at = None
+        self.course = _Course(time, measured_at, top, slowed_at, lowest, mark, marked_at, undone, steady, standing_at)
 
     def forget(self, paths: frozenset[StopPath], now: float) -> None:
-        """Drop paths that are lost; where one of them is in use, use the next at once."""
+        """Drop paths that are lost; where one of them is in use, use the next at once, slowdown or not."""
         self._paths = tuple(path for path in self._paths if path not in paths)
         self._left = [path for path in self._left if path not in paths]
-        if self._current in paths:
-            self.expire_current_path(now)
+        if self.use.path in paths:
+            self.use = replace(self.use, until=now)
+            self.course = replace(self.course, newest=now, slowed_at=None)
 
     def next_paths(self, now: float) -> list[StopPath]:
         """Return the path to use now [s], if one is due: a list of one, or an empty one."""
-        if self.standing_at is not None:
+        course, use, silence = self.course, self.use, self._limits.arm_silence
+        if course.standing_at is not None:
             return []
-        silent = now - self._arrived > self._silence
-        seen = now if silent else max(self._newest, now - self._silence)  # a controller's clock may stand still
-        late = seen >= self._deadline
-        due = seen >= self._next and (self.slowed_at is None or late)
+        silent = now - course.arrived > silence
+        seen = now if silent else max(course.newest, now - silence)  # a controller's clock may stand still
+        late = seen >= use.deadline
+        due = seen >= use.until and (course.slowed_at is None or late)
         # a program that has undone one stop will undo the next; a protective stop is what none replaces
-        strongest = late or (due and self._undone and not self._alone)
+        strongest = late or (due and course.undone and not self._alone)
         strongest = strongest and StopPath.PROTECTIVE in self._left and StopPath.PROTECTIVE not in self.used
         if not (strongest or due):
             return []
@@ -145,11 +150,10 @@ class StopMonitor:
             self._left, self.rounds = list(self._paths), self.rounds + 1
         if not self._left:
             return []
-        path = self._left.pop(self._left.index(StopPath.PROTECTIVE) if strongest else 0)
-        self._next = now + self._patience * (PROTECTIVE_PATIENCE if path is StopPath.PROTECTIVE else 1.0)
-        self._current, self.rippled = path, False
+        path, deadline = self._left.pop(self._left.index(StopPath.PROTECTIVE) if strongest else 0), use.deadline
         if path is StopPath.PROTECTIVE and path not in self.used:
-            self._deadline = max(self._deadline, seen + self._budget)  # what it slows down may brake to the end
+            deadline = max(deadline, seen + self._budget)  # what it slows down may brake to the end
+        self.use = _PathUse(path, now + self._patience(path), deadline)
         if path not in self.used:
             self.used.append(path)
         return [path]

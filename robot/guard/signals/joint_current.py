@@ -36,13 +36,14 @@ class OutsideTorque:
 
     Attributes:
         now: by the newest state [N m]. None where the controller sends no currents, or it is not known what they say.
+        spread: largest of each joint lately, while nothing touched [N m].
     """
 
     def __init__(self, model: ArmModel) -> None:
         self.now: Joints | None = None
         self._currents = model.currents
         self._usual: Joints | None = None
-        self._spread: Joints = (0.0,) * model.joints
+        self.spread: Joints = (0.0,) * model.joints
 
     def feed(self, state: ControllerState, untouched: bool) -> None:
         """Take a measured state. While nothing touches and the arm is free, what it shows is learned."""
@@ -59,19 +60,14 @@ class OutsideTorque:
         if untouched:
             self._usual = tuple([a + b / _LEARNING_TIME for a, b in zip(usual, off, strict=True)])
             kept = 1.0 - 1.0 / _LEARNING_TIME
-            self._spread = tuple([max(abs(a), kept * b) for a, b in zip(off, self._spread, strict=True)])
-
-    @property
-    def spread(self) -> Joints:
-        """Largest torque of each joint lately, while nothing touched [N m]."""
-        return self._spread
+            self.spread = tuple([max(abs(a), kept * b) for a, b in zip(off, self.spread, strict=True)])
 
     @property
     def tolerance(self) -> Joints:
         """Torque of each joint that counts as nothing [N m]."""
         if (currents := self._currents) is None:
-            return self._spread
-        rows = zip(currents.min_unexplained, currents.max_unexplained, self._spread, strict=True)
+            return self.spread
+        rows = zip(currents.min_unexplained, currents.max_unexplained, self.spread, strict=True)
         return tuple([min(most, least + _SPREADS * spread) for least, most, spread in rows])
 
 

@@ -168,20 +168,24 @@ def force_block(time: float, force: float, places: Sequence[Sequence[float]] = (
 def body_places(payload: bytes) -> tuple[tuple[float, float, float], ...]:
     """Return the places in what ``force_block`` has recorded [m]. None for another truth, and for nonsense."""
     try:
-        found = tuple((float(x), float(y), float(z)) for x, y, z in read_json(payload).get("bodies_m", ()))
-    except (ValueError, TypeError, AttributeError):
+        found = tuple((float(x), float(y), float(z)) for x, y, z in _truth(payload, "bodies_m", ()))
+    except (ValueError, TypeError):
         return ()
     return found if all(math.isfinite(value) for place in found for value in place) else ()
 
 
 def contact_force(payload: bytes) -> float | None:
     """Return the force in what ``force_block`` has recorded [N]. None for another truth, and for nonsense."""
-    try:
-        force = read_json(payload).get("contact_force_N")
-    except (ValueError, AttributeError):
-        return None
+    force = _truth(payload, "contact_force_N", None)
     known = isinstance(force, int | float) and math.isfinite(force) and force >= 0.0
     return float(force) if known else None
+
+
+def _truth(payload: bytes, name: str, default: Any) -> Any:
+    try:
+        return read_json(payload).get(name, default)
+    except (ValueError, AttributeError):
+        return default
 
 
 def decode_event(block: Block) -> GuardEvent:

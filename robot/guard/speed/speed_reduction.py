@@ -117,13 +117,9 @@ class SpeedReduction:
         """Take where the slider is, as read at a time [s]. None where it cannot be read any more."""
         self.slider, self._read_at = slider, time
 
-    def knows(self, time: float) -> bool:
-        """Tell whether the position of the slider is known at a time [s]."""
-        return self.slider is not None and time - self._read_at <= _MAX_SLIDER_AGE
-
     def known(self, time: float) -> float | None:
         """Return the position of the slider. None where it is not known at a time [s]."""
-        return self.slider if self.knows(time) else None
+        return self.slider if time - self._read_at <= _MAX_SLIDER_AGE else None
 
     def begin(
         self,
@@ -147,8 +143,8 @@ class SpeedReduction:
             contacts: the touches there are.
             out: takes commands and events.
         """
-        before, top = self.slider, [0.0, 0.0]
-        if before is None or state is None or not self.knows(time):
+        before, top = self.known(time), [0.0, 0.0]
+        if before is None or state is None:
             return False
         approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
         approach.update(state.q, state.qd, contacts)
@@ -189,7 +185,7 @@ class SpeedReduction:
             return f"while slow, the surface would move {1e3 * self.approach.way:.1f} mm into the touch"
         if self._held:
             return f"while slow, {self._held}"
-        if not self.knows(time):
+        if self.known(time) is None:
             return "the controller does not report its speed slider any more"
         return self.now.trouble(time, self.slider)
 
@@ -200,7 +196,7 @@ class SpeedReduction:
     def put_back(self, time: float, out: Outputs) -> None:
         """End it: put the slider back where it was, unless a stop needs it at 0 or a person has moved it since."""
         touch, self.now = self.now, None
-        if touch is not None and self._halted_from is None and self.knows(time) and touch.puts_back(self.slider):
+        if touch is not None and self._halted_from is None and touch.puts_back(self.known(time)):
             out.append(SetSpeedSlider(touch.before))
             self.slider, self._last = touch.before, (time, touch)
 

@@ -21,11 +21,11 @@ from coneskin.robot.arm.workspace import (
     _PART_NAMES,
     REACTION_TIME,
     ArmSweep,
-    JointLimits,
     Workspace,
     _clearance_needed,
     _close_pairs,
     _segment_distance,
+    blocked_joints,
     reach,
     skeleton,
 )
@@ -163,7 +163,7 @@ def follow(plan, q, period=0.004):
     while True:
         step = retreat_step(plan, ArmState(time, q, qd))
         if isinstance(step, Done):
-            braking = max(map(abs, qd)) / (2.0 * JointLimits.of(ARM, plan.reaction.acceleration).braking)
+            braking = max(map(abs, qd)) / (2.0 * plan.reaction.acceleration)
             return tuple(a + braking * v for a, v in zip(q, qd, strict=True)), step.reason
         time, qd = time + period, step.qd
         q = tuple(a + period * v for a, v in zip(q, qd, strict=True))
@@ -182,33 +182,33 @@ def test_a_part_that_is_too_close_may_move_out():
 def test_a_joint_is_blocked_exactly_where_it_could_no_longer_brake(
     speed: float, room: float, braking: float, side: float
 ) -> None:
-    limits = JointLimits.of(arm_model("UR5e"), braking)
-    edge = limits.upper[1] if side > 0 else limits.lower[1]
+    arm = arm_model("UR5e")
+    edge = side * (arm.joint_upper[1] - _LIMIT_MARGIN)
     q = (0.0, edge - side * room, 0.0, 0.0, 0.0, 0.0)
     needed = speed * REACTION_TIME + speed**2 / (2.0 * braking)
     if abs(needed - room) < 1e-9 or speed == 0.0:
         return
-    assert (limits.blocked(q, ZERO_VELOCITY, [0.0, side * speed]) == [1]) == (needed > room)
-    assert limits.blocked(q, ZERO_VELOCITY, [0.0, -side * 1e-6]) == []  # away from it is free
+    assert (blocked_joints(arm, braking, q, ZERO_VELOCITY, [0.0, side * speed]) == [1]) == (needed > room)
+    assert blocked_joints(arm, braking, q, ZERO_VELOCITY, [0.0, -side * 1e-6]) == []  # away from it is free
 
 
 def test_the_speed_that_a_joint_has_counts_if_it_is_more_than_the_one_wanted() -> None:
-    limits = JointLimits.of(arm_model("UR5e"), 4.0)
-    q = (limits.upper[0] - 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
-    assert limits.blocked(q, ZERO_VELOCITY, [0.1]) == []
-    assert limits.blocked(q, (2.0, 0.0, 0.0, 0.0, 0.0, 0.0), [0.1]) == [0]
-    assert limits.blocked(q, (2.0, 0.0, 0.0, 0.0, 0.0, 0.0), [-0.1]) == []
+    arm = arm_model("UR5e")
+    q = (arm.joint_upper[0] - _LIMIT_MARGIN - 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert blocked_joints(arm, 4.0, q, ZERO_VELOCITY, [0.1]) == []
+    assert blocked_joints(arm, 4.0, q, (2.0, 0.0, 0.0, 0.0, 0.0, 0.0), [0.1]) == [0]
+    assert blocked_joints(arm, 4.0, q, (2.0, 0.0, 0.0, 0.0, 0.0, 0.0), [-0.1]) == []
 
 
 def test_a_joint_that_turns_without_end_is_never_blocked() -> None:
-    limits = JointLimits.of(arm_model("UR3e"), 4.0)
-    assert limits.blocked((0.0,) * 5 + (500.0,), ZERO_VELOCITY, [0.0] * 5 + [3.0]) == []
+    assert blocked_joints(arm_model("UR3e"), 4.0, (0.0,) * 5 + (500.0,), ZERO_VELOCITY, [0.0] * 5 + [3.0]) == []
 
 
-def test_the_margin_is_kept_on_both_sides() -> None:
-    limits = JointLimits.of(arm_model("UR5e"), 4.0)
-    assert limits.upper[2] == pytest.approx(math.pi - _LIMIT_MARGIN)
-    assert limits.lower[2] == pytest.approx(-math.pi + _LIMIT_MARGIN)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_the_margin_is_kept_on_both_sides(side: float) -> None:
+    for room, blocked in ((_LIMIT_MARGIN + 1e-6, []), (_LIMIT_MARGIN - 1e-6, [2])):
+        q = (0.0, 0.0, side * (math.pi - room), 0.0, 0.0, 0.0)
+        assert blocked_joints(arm_model("UR5e"), 4.0, q, ZERO_VELOCITY, [0.0, 0.0, side * 1e-6]) == blocked
 
 
 @given(arms(), joints())

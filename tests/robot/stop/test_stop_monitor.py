@@ -8,13 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
+from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES, StopMonitor
 
 ALL = INTERNAL_PATHS
+LIMITS = MonitoringLimits(arm_silence=0.0)
 
 
 def monitor(speed=1.0, paths=ALL, budget=0.3):
-    return StopMonitor(0.0, speed, paths, 0.025, budget, 0.01)
+    return StopMonitor(0.0, speed, paths, LIMITS, budget)
 
 
 def test_a_stop_that_works_needs_one_way():
@@ -25,17 +27,17 @@ def test_a_stop_that_works_needs_one_way():
         assert stop.next_paths(now) == []
     assert stop.used == [StopPath.DRIVER]
     # 1 rad/s at 10 rad/s2 after 4 ms: 0.05 rad/s less at 10 ms (or one cycle later by rounding), standing at 104 ms
-    assert 0.0099 < stop.slowed_at < 0.0121
-    assert 0.104 <= stop.standing_at <= 0.104 + 0.002 * STANDSTILL_SAMPLES
+    assert 0.0099 < stop.course.slowed_at < 0.0121
+    assert 0.104 <= stop.course.standing_at <= 0.104 + 0.002 * STANDSTILL_SAMPLES
 
 
 def test_an_arm_that_was_still_speeding_up_has_slowed_when_it_is_below_its_top():
     stop = monitor(speed=0.5)
     for now, speed in ((0.002, 0.55), (0.004, 0.58), (0.006, 0.57)):
         stop.sample(now, speed)
-        assert stop.slowed_at is None
+        assert stop.course.slowed_at is None
     stop.sample(0.008, 0.52)
-    assert stop.slowed_at == 0.008
+    assert stop.course.slowed_at == 0.008
 
 
 def test_ways_come_one_by_one_without_slowdown_and_the_last_one_after_the_budget():
@@ -59,7 +61,7 @@ def test_ways_come_one_by_one_without_slowdown_and_the_last_one_after_the_budget
 
 def stubborn(seconds=2.0, restart=0.0, paths=ALL, obeys=frozenset(StopPath)):
     """An arm at 1 rad/s that each stop brakes at 10 rad/s2; a new program starts once it stands, or after a while."""
-    stop = StopMonitor(0.0, 1.0, paths, 0.025, 0.2, 0.01)
+    stop = monitor(paths=paths, budget=0.2)
     speed, braking, rest, named = 1.0, True, 0.0, []
     for k in range(1, round(500 * seconds)):
         now = 0.002 * k
@@ -76,7 +78,7 @@ def stubborn(seconds=2.0, restart=0.0, paths=ALL, obeys=frozenset(StopPath)):
             if path is StopPath.PROTECTIVE and path in obeys:
                 return stop, named, now
             braking = True
-        if stop.standing_at is not None:
+        if stop.course.standing_at is not None:
             return stop, named, now
     return stop, named, None
 
@@ -91,7 +93,7 @@ def test_a_program_that_starts_again_and_again_ends_in_a_protective_stop():
 @pytest.mark.parametrize("hertz", [2, 8, 20, 60])
 @pytest.mark.parametrize("swing", [0.06, 0.1, 0.2])
 def test_an_arm_that_shakes_as_it_goes_on_gets_a_protective_stop(hertz, swing):
-    stop = StopMonitor(0.0, 1.0, EXTERNAL_PATHS, 0.025, 0.2, 0.01)
+    stop = monitor(paths=EXTERNAL_PATHS, budget=0.2)
     named = []
     for k in range(1, 500):
         now = 0.002 * k
@@ -106,7 +108,7 @@ def test_an_arm_that_shakes_as_it_goes_on_gets_a_protective_stop(hertz, swing):
 @pytest.mark.parametrize(("paths", "next_path"), [(EXTERNAL_PATHS, StopPath.PROTECTIVE), (ALL, StopPath.PROGRAM)])
 def test_a_slowdown_that_ends_before_the_arm_stands_is_one_no_more(deceleration, paths, next_path):
     """Where other programs move the arm, what has undone one stop would undo the next: none undoes a protective one."""
-    stop = StopMonitor(0.0, 1.0, paths, 0.025, 1.0 / deceleration + 0.1, 0.01)
+    stop = monitor(paths=paths, budget=1.0 / deceleration + 0.1)
     named, end = [], 0.2 / deceleration  # then another program has replaced that of the stop
     for k in range(1, 60):
         now = 0.002 * k
@@ -147,7 +149,7 @@ def test_a_stop_is_tried_again_and_again_while_the_arm_moves():
 def test_without_any_measurement_every_way_is_tried():
     stop = monitor(speed=None)
     assert [path for k in range(150) for path in stop.next_paths(0.001 * k)] == list(ALL[1:])
-    assert stop.standing_at is None
+    assert stop.course.standing_at is None
 
 
 @pytest.mark.promise("P22")
@@ -155,27 +157,27 @@ def test_a_passing_zero_is_no_standstill():
     stop = monitor()
     for k in range(50):
         stop.sample(0.002 * k, 0.0 if k % STANDSTILL_SAMPLES else 0.5)
-    assert stop.standing_at is None
+    assert stop.course.standing_at is None
 
 
 def test_samples_from_before_the_stop_say_nothing_and_late_ones_are_not_counted_as_slow():
-    stop = StopMonitor(1.0, 1.0, ALL, 0.025, 0.3, 0.01, 0.05)
+    stop = StopMonitor(1.0, 1.0, ALL, MonitoringLimits(), 0.3)
     now = 1.0005
     for k in range(20):  # 20 states of the 40 ms before the stop, read just after it
         stop.sample(now, 0.9, 0.96 + 0.002 * k)
         assert stop.next_paths(now) == []
-    assert stop.slowed_at is None
+    assert stop.course.slowed_at is None
     now = 1.04  # held up again: what comes now was measured from 2 ms after the stop on
     for k in range(20):
         measured = 1.002 + 0.002 * k
         stop.sample(now, 1.0 - 10.0 * max(0.0, measured - 1.006), measured)
         assert stop.next_paths(now) == []
-    assert stop.slowed_at == now
+    assert stop.course.slowed_at == now
 
 
 @pytest.mark.parametrize("stuck", [True, False])
 def test_neither_silence_nor_a_clock_that_stands_still_keeps_the_next_way_away(stuck):
-    stop = StopMonitor(1.0, 1.0, ALL, 0.025, 0.3, 0.01, 0.05)
+    stop = StopMonitor(1.0, 1.0, ALL, MonitoringLimits(), 0.3)
     taken = {}
     for k in range(1, 600):
         now = 1.0 + 0.001 * k
@@ -201,7 +203,7 @@ def test_hurry_takes_the_next_way_at_once():
     stop = monitor()
     stop.sample(0.002, 0.9)
     assert stop.next_paths(0.002) == []
-    stop.expire_current_path(0.003)
+    stop.forget(frozenset({StopPath.DRIVER}), 0.003)
     assert stop.next_paths(0.003) == [StopPath.PROGRAM]
 
 
@@ -215,6 +217,6 @@ def test_standing_means_the_last_samples_were_slow_and_a_protective_stop_is_left
             assert 0.002 * k >= quiet_until
             if path is StopPath.PROTECTIVE:
                 quiet_until = 0.002 * k + 0.0999
-        assert (stop.standing_at is not None) == (
+        assert (stop.course.standing_at is not None) == (
             k + 1 >= STANDSTILL_SAMPLES and max(speeds[max(0, k + 1 - STANDSTILL_SAMPLES) : k + 1]) < 0.01
         )
