@@ -38,7 +38,8 @@ def damping_squared(columns: Sequence[Vector]) -> float:
         a, b = dot(columns[0], columns[0]) + DAMPING_FLOOR, dot(columns[1], columns[1]) + DAMPING_FLOOR
         smallest = (a * b - dot(columns[0], columns[1]) ** 2) / (a + b)
     else:
-        (xx, xy, xz), (_, yy, yz), (_, _, zz) = _gram(columns, DAMPING_FLOOR)
+        xx, yy, zz = (sum(c[i] * c[i] for c in columns) + DAMPING_FLOOR for i in range(3))
+        xy, xz, yz = (sum(c[i] * c[j] for c in columns) for i, j in ((0, 1), (0, 2), (1, 2)))
         kx, ky, kz = yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy
         smallest = (xx * kx - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)) / (kx + ky + kz)
     if smallest >= SINGULAR_BELOW:
@@ -83,11 +84,6 @@ def damped_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[li
 def _tiny(row: Sequence[float], speeds: Sequence[float]) -> float:
     """Return what rounding may leave of an inner product that is zero; below 1 pm/s nothing moves."""
     return 1e-12 + 1e-9 * sum(abs(a * b) for a, b in zip(row, speeds, strict=True))
-
-
-def _gram(columns: Sequence[Vector], extra: float) -> list[list[float]]:
-    """Return J J^T plus extra on its diagonal."""
-    return [[sum(c[i] * c[j] for c in columns) + extra * (i == j) for j in range(3)] for i in range(3)]
 
 
 def _solve(matrix: Sequence[Sequence[float]], right: Sequence[float]) -> list[float]:

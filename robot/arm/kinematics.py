@@ -143,10 +143,7 @@ def link_motion(model: ArmModel, q: Sequence[float], qd: Sequence[float], link: 
     for (_, _, axis, o), speed in zip(joints, qd, strict=False):
         velocity = added(velocity, scaled(cross(axis, minus(origin, o)), speed))
         turn = added(turn, scaled(axis, speed))
-    return (
-        (dot(x, velocity), dot(y, velocity), dot(z, velocity)),
-        (dot(x, turn), dot(y, turn), dot(z, turn)),
-    )
+    return ((dot(x, velocity), dot(y, velocity), dot(z, velocity)), (dot(x, turn), dot(y, turn), dot(z, turn)))
 
 
 def flange_jacobian(model: ArmModel, q: Sequence[float]) -> tuple[Joints, Joints, Joints, Joints, Joints, Joints]:
@@ -192,10 +189,7 @@ def _combined(x: Vector, y: Vector, z: Vector, by: Vector, start: Vector = (0.0,
 def _turned(u: Vector, v: Vector, c: float, s: float) -> tuple[Vector, Vector]:
     """Turn two axes in their own plane from u towards v."""
     (ux, uy, uz), (vx, vy, vz) = u, v
-    return (
-        (ux * c + vx * s, uy * c + vy * s, uz * c + vz * s),
-        (vx * c - ux * s, vy * c - uy * s, vz * c - uz * s),
-    )
+    return ((ux * c + vx * s, uy * c + vy * s, uz * c + vz * s), (vx * c - ux * s, vy * c - uy * s, vz * c - uz * s))
 
 
 def _pose(frame: _Frame) -> Pose:

@@ -130,12 +130,7 @@ def _clearance_needed(model: ArmModel) -> float:
 
 
 def _close_pairs(model: ArmModel, corners: Sequence[Vector]) -> list[tuple[int, int, float]]:
-    """Return the pairs of parts that are closer than ``_clearance_needed``: their indices, and how far apart [m].
-
-    Args:
-        model: the arm.
-        corners: its skeleton [m].
-    """
+    """Return the pairs of parts that are closer than ``_clearance_needed``: their indices, and how far apart [m]."""
     least = _clearance_needed(model)
     sizes = [math.dist(a, b) for a, b in pairwise(corners)]
     found = []

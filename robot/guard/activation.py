@@ -75,12 +75,9 @@ class Activation:
         self._request, self._free_since, self._released_at, self._disturbed = request, now, None, False
 
     def poll(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
-        """Return what is due. A first activation waits as long as there is a blocker. Any blocker refuses a reset.
+        """Return what is due at a host time [s].
 
-        Args:
-            now: host time [s].
-            blockers: what stands against it, one line each.
-            out: takes events.
+        A first activation waits as long as there is a blocker, one line each. Any blocker refuses a reset.
         """
         if self._disturbed:
             blockers, self._disturbed = [*blockers, "it was touched meanwhile"], False

@@ -176,10 +176,7 @@ class ArmSupervisor:
     def stop_for_touch(self, link: int, level: float, out: Outputs) -> None:
         """Send the stop for a touch that begins, before anything else is known of it. ``touch`` has to come next.
 
-        Args:
-            link: index of the touched link's DH frame.
-            level: how firm the touch is.
-            out: takes the stop. Nothing where the reaction only slows the arm.
+        Where the reaction to a touch of this link's DH frame, and this level, only slows the arm, there is none.
         """
         reaction = self._rules.choose(link, level, self._speed) if self._rules.rules else self._rules.default
         if self.phase is Phase.ACTIVE and reaction.kind != "slow":
@@ -271,13 +268,7 @@ class ArmSupervisor:
             self._latch(state, out)
 
     def poll(self, now: float, fair: float, out: Outputs) -> None:
-        """Decide what only the passing of time shows.
-
-        Args:
-            now: host time [s].
-            fair: the same, without what the guard itself was held up [s].
-            out: takes commands and events.
-        """
+        """Decide what only the passing of time shows, ``fair`` without that for which the guard was held up [s]."""
         stop, phase = self._stop, self.supervision.phase
         if phase.brakes:
             path, rounds = stop.escalate(now, out)
@@ -288,11 +279,11 @@ class ArmSupervisor:
                 emit(out, EventName.STOP_FAILED, now, rounds=rounds, speed=speed)
             self.speed_reduction.note_stop(stop.used)
         elif phase is Phase.SLOWED:
+            slowed = self.speed_reduction.now
             if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
-                approach = self.speed_reduction.approach
-                contact = self._touches.find(approach.exceeded if approach else 0)
+                contact = self._touches.find(0 if slowed is None else slowed.approach.exceeded)
                 self._follow(now, Cue.FAULTED, why, out, contact)
-            elif self.speed_reduction.over(now):
+            elif slowed is None or slowed.over(now):
                 self._follow(now, Cue.FREED, "", out)
                 self.speed_reduction.put_back(now, out)
                 emit(out, EventName.RESUMED, now, slider=self.speed_reduction.slider)

@@ -152,8 +152,7 @@ class CompanionMonitor:
     def poll(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
         """Return each process that has fallen silent since the last look: why, and what a stop must not count on.
 
-        Args:
-            now: host time on the ``StallClock`` [s].
+        The time is that on the ``_StallClock`` [s].
         """
         before, self._silent = self._silent, self._look(now)
         if not self._silent:

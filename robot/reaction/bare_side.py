@@ -70,11 +70,9 @@ class BareSides:
         self._stations = tuple(stations)
 
     def way(self, q: Joints, there: Sequence[float]) -> tuple[float, str]:
-        """Return how far a bare surface moves outward at most from joints to joints [m], and which part's that is.
+        """Return how far a bare surface moves outward at most [m], and which part's that is.
 
-        Args:
-            q: joint positions [rad].
-            there: joint positions after the motion [rad], not far from q.
+        From joint positions to others [rad] that are not far from them.
         """
         here, then = link_poses(self._model, q), link_poses(self._model, there)
         farthest, part = 0.0, ""
@@ -106,11 +104,7 @@ def _strip(sheet: PlacedFrustum) -> tuple[Vector, Vector, float] | None:
     half = 0.5 * (math.tau - wrap)
     turn = sheet.link_frustum.rotate
     middle, around = wrap + half, wrap + half + 0.5 * math.pi
-    return (
-        turn((math.cos(middle), math.sin(middle), 0.0)),
-        turn((math.cos(around), math.sin(around), 0.0)),
-        half,
-    )
+    return (turn((math.cos(middle), math.sin(middle), 0.0)), turn((math.cos(around), math.sin(around), 0.0)), half)
 
 
 def _span(begin: Vector, end: Vector, sheet: PlacedFrustum) -> tuple[float, float] | None:

@@ -104,7 +104,7 @@ class ContactSupervision:
         return ""
 
     def _level(self, time: float, q: Joints, watched: _Watched, contact: ContactOnLink) -> str:
-        if self._complying or watched.link == 0:
+        if self._complying:
             return ""
         point, level = place_point(self._model, q, watched.link, watched.point).point, contact.level
         away = dot(minus(watched.start, point), watched.normal)
@@ -134,13 +134,7 @@ def clamped(contacts: Sequence[ContactOnLink]) -> bool:
 
 
 def opposed(model: ArmModel, q: Joints, contacts: Sequence[ContactOnLink]) -> bool:
-    """Tell whether two touches push against each other: their normals in the base frame are over 90 deg apart.
-
-    Args:
-        model: the arm.
-        q: joint positions [rad].
-        contacts: the touches.
-    """
+    """Tell whether two touches push against each other at q [rad]: their normals are over 90 deg apart in the base."""
     if len(contacts) < 2:
         return False
     normals = [place_point(model, q, c.link, c.point, c.normal).direction for c in contacts]

@@ -91,11 +91,9 @@ class RuleSet:
         return self.default
 
     def hardest(self, touches: Iterable[tuple[int, float]], speed: float) -> Reaction:
-        """Return the reaction to several touches at once: the least gentle of theirs, the first of these.
+        """Return the reaction to several touches at once, link and level of each: the least gentle of theirs.
 
-        Args:
-            touches: link and level of each; none at all gives the default.
-            speed: of the leading joint when they began [rad/s].
+        None at all gives the default. The speed is that of the leading joint when they began [rad/s].
         """
         chosen = [self.choose(link, level, speed) for link, level in touches]
         return max(chosen, key=lambda reaction: KINDS.index(reaction.kind), default=self.default)

@@ -55,12 +55,9 @@ class ArmStop:
         self._order, self.used = paths, paths[:1]
 
     def begin(self, now: float, speed: float | None, deceleration: float) -> None:
-        """Begin to monitor the stop that was sent.
+        """Begin to monitor the stop that was sent at a host time [s], with its deceleration [rad/s2].
 
-        Args:
-            now: host time [s].
-            speed: largest joint speed [rad/s]. None where it is not known.
-            deceleration: of the stop [rad/s2].
+        The largest joint speed is None where it is not known [rad/s].
         """
         limits, self._deceleration = self._limits, deceleration
         if self._order[:1] == (StopPath.PROTECTIVE,):

@@ -20,14 +20,7 @@ from coneskin.core.channel import Channel, decode_json, encode_json, wait_readab
 from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.liveness import BEAT_PERIOD, GUARD_SILENCE, UNGUARDED_TIME
-from coneskin.robot.driver.messages import (
-    LEAVE,
-    Release,
-    Shutdown,
-    StatusReport,
-    StopProgram,
-    decode_command,
-)
+from coneskin.robot.driver.messages import LEAVE, Release, Shutdown, StatusReport, StopProgram, decode_command
 from coneskin.robot.driver.protocol import PayloadReader, load_driver
 
 from .backup_stop import StandstillHold

@@ -41,8 +41,6 @@ class MonitoringLimits:
     def stop_budget(self, speed: float, deceleration: float) -> float:
         """Return the time within which an arm should stand after a stop: braking, and four times ``escalate`` [s].
 
-        Args:
-            speed: of the leading joint [rad/s].
-            deceleration: of the stop [rad/s2].
+        The speed is that of the leading joint [rad/s], the deceleration that of the stop [rad/s2].
         """
         return speed / deceleration + 4.0 * self.escalate

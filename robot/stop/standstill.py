@@ -114,9 +114,7 @@ class StandstillWatch:
     def moved(self, state: ControllerState, touched: bool) -> bool:
         """Take a measured state and tell whether a program moves the arm, or is about to; then the watch is over.
 
-        Args:
-            state: as measured.
-            touched: True while anything touches the skin.
+        ``touched`` while anything touches the skin.
         """
         if self._now is None:
             return False

@@ -113,12 +113,7 @@ class ReactionPlanner:
         self._workspace = Workspace(model, table)
 
     def begin(
-        self,
-        reaction: Reaction,
-        at_touch: ArmState,
-        here: ArmState,
-        contacts: Sequence[ContactOnLink],
-        out: Outputs,
+        self, reaction: Reaction, at_touch: ArmState, here: ArmState, contacts: Sequence[ContactOnLink], out: Outputs
     ) -> MotionStream | str:
         """Begin to move away, or return why that cannot be.
 
@@ -257,9 +252,8 @@ class MotionStream:
         ahead = [q + _BARE_STEP * v for q, v in zip(state.q, step.qd, strict=True)]
         if not self._allowed:
             return _bare_way(bare, self._start, ahead) or step
-        speed, most = bare.way(state.q, ahead)[0] / _BARE_STEP, MAX_BARE_SPEED
-        if self.how == "push":
-            most = _MAX_PUSHED_SPEED
+        speed = bare.way(state.q, ahead)[0] / _BARE_STEP
+        most = _MAX_PUSHED_SPEED if self.how == "push" else MAX_BARE_SPEED
         if speed <= most:
             return step
         share = most / speed

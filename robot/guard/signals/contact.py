@@ -88,15 +88,11 @@ class Contact:
             "elongation": touch.elongation,
             "velocity": touch.velocity,
         }
-        if touch.elongation is not None:
-            known["line"] = self._line(point, *touch.elongation)
+        if touch.elongation is not None:  # half of the line on which contacts lie about the place
+            known["line"] = _in_plane(*touch.elongation, *self._axes(point))
         if self.where.force is not None:
             known["force"] = self.where.force(touch.level)
         return {**self.summary(), "point": point, "normal": normal, **known, **stamp}
-
-    def _line(self, point: Vector, half: float, direction: float) -> Vector:
-        """Return the half of the line on which contacts lie about the place, in the link's frame [m]."""
-        return _in_plane(half, direction, *self._axes(point))
 
     def _axes(self, point: Vector) -> tuple[Vector, Vector]:
         """Return the unit vectors along the side and around, at the place, in the link's frame."""
@@ -136,13 +132,12 @@ class TouchRecord:
         rules: reactions of the scene.
 
     Attributes:
-        rules: the same.
         contacts: touches that there are now, by every frame.
         placed: the same, as last seen while the arm stopped.
     """
 
     def __init__(self, rules: RuleSet) -> None:
-        self.rules = rules
+        self._rules = rules
         self.contacts: Sequence[ContactOnLink] = ()
         self.placed: Sequence[ContactOnLink] = ()
         self._speed = math.inf  # of the leading joint when the first began [rad/s]
@@ -163,7 +158,7 @@ class TouchRecord:
         link, level = contact.where.link, contact.touch.level
         if level > self._levels.get(link, 0.0):
             self._levels[link] = level
-        return self.rules.choose(link, level, self._speed)
+        return self._rules.choose(link, level, self._speed)
 
     def feed(self, contacts: Sequence[Contact], stopping: bool) -> None:
         """Take what the newest frame says of every touch that there is. ``stopping`` while the arm stops."""
@@ -184,4 +179,4 @@ class TouchRecord:
 
     def hardest(self) -> Reaction:
         """Return the reaction to all of them, each as firm as it has been."""
-        return self.rules.hardest(self._levels.items(), self._speed)
+        return self._rules.hardest(self._levels.items(), self._speed)

@@ -23,12 +23,7 @@ _PUSH_LIMITS = {"level", "damping", "place"}  # limits of an arm that gives way,
 
 
 def describe(event: GuardEvent, start: float) -> str:
-    """Return the line for an event.
-
-    Args:
-        event: what happened.
-        start: host time that counts as 0 [s].
-    """
+    """Return the line for an event; ``start`` is the host time that counts as 0 [s]."""
     try:
         text = _words(event)
     except (LookupError, TypeError, ValueError, AttributeError):  # recorded by another version, or damaged

@@ -48,10 +48,8 @@ class BlockKind(IntEnum):
     TRUTH = 23  #: JSON: with what a virtual skin was touched, whether it was noticed or not; the force of a contact
     ECHO = 30  #: payload of the heartbeat's connection, for the driver's ``decode_heartbeat``
     SUSPENDED = 31  #: for how long the loop did nothing [s], by a clock that goes on while the computer sleeps
-    HELD_UP = (
-        33  #: this computer does not let a process beside the guard run: how busy it is, in words, a line feed, which
-    )
     REOPENED = 32  #: what was lost is open again; the payload says which: the skin
+    HELD_UP = 33  #: this computer does not let a process beside the guard run: its load in words, a line feed, which
 
 
 class EventName(StrEnum):

@@ -64,12 +64,7 @@ class PermissibleSpeeds:
 
 
 class SurfaceSpeeds:
-    """Speeds of the surfaces of one arm.
-
-    Args:
-        model: the arm.
-        speeds: that are permissible.
-    """
+    """Speeds of the surfaces of one arm, held against those that are permissible."""
 
     def __init__(self, model: ArmModel, speeds: PermissibleSpeeds) -> None:
         self._speeds = speeds
@@ -81,12 +76,7 @@ class SurfaceSpeeds:
         self._links = sorted(rows.items(), key=itemgetter(0))
 
     def ratio(self, q: Sequence[float], qd: Sequence[float]) -> tuple[float, str]:
-        """Return the highest speed of a patch over what is permissible, and the patch's sensor.
-
-        Args:
-            q: joint positions [rad].
-            qd: joint speeds [rad/s].
-        """
+        """Return the highest speed of a patch over what is permissible, and its sensor, at q [rad] and qd [rad/s]."""
         leading = max(map(abs, qd))
         if leading <= 0.0:
             return 0.0, ""

@@ -180,13 +180,7 @@ class SpeedLimit:
         self.setting.resume()
 
     def end(self, now: float, slider: float | None, out: Outputs) -> None:
-        """Put the slider back where it was found, unless a stop or a person has moved it since.
-
-        Args:
-            now: host time [s].
-            slider: where it is. None where that is not known.
-            out: takes the slider's setting, and an event.
-        """
+        """Put the slider back where it was found, from where it is, unless a stop or a person has moved it since."""
         setting = self.setting
         found = None if slider is None else setting.found(slider)
         if found is not None and slider is not None:

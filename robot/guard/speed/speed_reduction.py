@@ -43,6 +43,10 @@ class _ReducedSpeedTouch:
     deadline: float  # by when the arm must be slower [s]
     end: float  # until when the touch may last [s]
     slow: float  # speed of the surface below which the arm counts as slow [m/s]
+    approach: ContactApproach  # of the arm to what touches it
+    torque: OutsideTorque
+    resistance: ResistanceMonitor
+    held: str = ""  # why the arm counts as held by something
     free_since: float | None = None
     fast: int = 0  # samples in a row
 
@@ -92,7 +96,6 @@ class SpeedReduction:
     Attributes:
         slider: where the controller's speed slider was last. None where that is not known.
         now: the touch that is under way, or None.
-        approach: of the arm to what touches it, as of that touch.
     """
 
     def __init__(self, model: ArmModel, used: bool) -> None:
@@ -104,9 +107,6 @@ class SpeedReduction:
             self._approach_of, self._torque_of, self._monitor_of = ContactApproach, OutsideTorque, ResistanceMonitor
             # at any speed and acceleration: none was learned
             self._tolerance = None if model.currents is None else model.currents.max_unexplained
-        self.approach: ContactApproach | None = None
-        self._resistance: tuple[OutsideTorque, ResistanceMonitor] | None = None
-        self._held = ""  # why the arm counts as held by something
         self.slider: float | None = None
         self._read_at = -math.inf
         self.now: _ReducedSpeedTouch | None = None
@@ -157,41 +157,37 @@ class SpeedReduction:
                 before = last.before
         deadline, end = time + limits.stop_budget(state.speed, reaction.deceleration), time + reaction.time_budget
         fraction = min(before, reaction.slow_to)
-        self.now = _ReducedSpeedTouch(top, before, fraction, deadline, end, reaction.slow_speed)
         torque = self._torque_of(self._model)
-        self._resistance = torque, self._monitor_of(self._model, torque, True, self._tolerance)
-        self.approach, self._held = approach, ""
+        resistance = self._monitor_of(self._model, torque, True, self._tolerance)
+        slow = reaction.slow_speed
+        self.now = _ReducedSpeedTouch(top, before, fraction, deadline, end, slow, approach, torque, resistance)
         out.append(SetSpeedSlider(self.now.fraction))
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
         return True
 
     def sample(self, state: ControllerState, contacts: Sequence[ContactOnLink]) -> None:
         """Take a measured state, and the touches there are by their newest frames."""
-        if self.now is not None and self.approach is not None:
-            self.approach.update(state.q, state.qd, contacts)
-            self.now.sample(state.time, self.approach.speed, self.approach.certain)
-            if self._resistance is not None and contacts and not self._held:
-                torque, resistance = self._resistance
-                torque.feed(state, False)
-                if torque.now is not None:
-                    self._held = resistance.resistance(state.q, contacts)
+        if (touch := self.now) is None:
+            return
+        touch.approach.update(state.q, state.qd, contacts)
+        touch.sample(state.time, touch.approach.speed, touch.approach.certain)
+        if contacts and not touch.held:
+            touch.torque.feed(state, False)
+            if touch.torque.now is not None:
+                touch.held = touch.resistance.resistance(state.q, contacts)
 
     def poll(self, time: float, touched: bool) -> str:
         """Return why the arm has to be stopped after all. Empty where it has not."""
-        if self.now is None:
+        if (touch := self.now) is None:
             return ""
-        self.now.touched(time, touched)
-        if self.approach is not None and self.approach.exceeded:
-            return f"while slow, the surface would move {1e3 * self.approach.way:.1f} mm into the touch"
-        if self._held:
-            return f"while slow, {self._held}"
+        touch.touched(time, touched)
+        if touch.approach.exceeded:
+            return f"while slow, the surface would move {1e3 * touch.approach.way:.1f} mm into the touch"
+        if touch.held:
+            return f"while slow, {touch.held}"
         if self.known(time) is None:
             return "the controller does not report its speed slider any more"
-        return self.now.trouble(time, self.slider)
-
-    def over(self, time: float) -> bool:
-        """Tell whether the arm may go on as before."""
-        return self.now is None or self.now.over(time)
+        return touch.trouble(time, self.slider)
 
     def put_back(self, time: float, out: Outputs) -> None:
         """End it: put the slider back where it was, unless a stop needs it at 0 or a person has moved it since."""

@@ -135,23 +135,11 @@ def write_record(scene: Scene, record: CommissioningRecord) -> Path:
 
 
 def _read_record(path: Path) -> CommissioningRecord:
-    """Read a record.
-
-    Raises:
-        FileNotFoundError: there is none.
-        ValueError: it cannot be read, or is no record; the message says why.
-    """
-    try:
-        table = read_json(read_file(path, _MAX_BYTES))
-        marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
-        record = CommissioningRecord(**table, marks=marks)
-        datetime.fromisoformat(record.date)
-    except FileNotFoundError:
-        raise
-    except OSError as exc:
-        raise ValueError(f"it cannot be read: {exc.strerror or exc}") from exc
-    except (ValueError, TypeError, AttributeError, KeyError) as exc:
-        raise ValueError(f"it is no commissioning record: {exc}") from exc
+    """Read a record. Whatever is not one raises an OSError, ValueError, TypeError, AttributeError or KeyError."""
+    table = read_json(read_file(path, _MAX_BYTES))
+    marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
+    record = CommissioningRecord(**table, marks=marks)
+    datetime.fromisoformat(record.date)
     return record
 
 
@@ -173,8 +161,10 @@ def _check(scene: Scene, now: float) -> Commissioning:
         record = _read_record(path)
     except FileNotFoundError:
         why = f"there is no commissioning record {path.name}"
-    except ValueError as exc:
-        why = f"the commissioning record {path.name} is of no use, {exc}"
+    except OSError as exc:
+        why = f"the commissioning record {path.name} is of no use, it cannot be read: {exc.strerror or exc}"
+    except (ValueError, TypeError, AttributeError, KeyError) as exc:
+        why = f"the commissioning record {path.name} is of no use, it is no commissioning record: {exc}"
     else:
         then = datetime.fromisoformat(record.date)
         then = then if then.tzinfo else then.replace(tzinfo=UTC)

@@ -26,17 +26,8 @@ if TYPE_CHECKING:
 
 #: that a scene may have
 TABLES = (
-    "arm",
-    "link",
-    "source",
-    "reaction",
-    "monitoring",
-    "recording",
-    "motion",
-    "commissioning",
-    "body",
-    "padding",
-    "speed_limit",
+    *("arm", "link", "source", "reaction", "monitoring", "recording"),
+    *("motion", "commissioning", "body", "padding", "speed_limit"),
 )
 TUBE_LENGTHS = {"upper_arm": 1, "forearm": 2}  #: link name -> index of the DH length that is the tube's
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
@@ -96,9 +87,10 @@ def parse_scene(
     named = frozenset(tables)
     problems = [f"unknown table [{t}]; {suggest(t, TABLES)}" for t in tables if t not in TABLES]
     for table in (name for name in TABLES if name not in ("link", "body")):
-        several = table == "source" and _is_array_of_tables(tables.get(table))
-        if table in tables and not isinstance(tables[table], dict) and not several:
-            problems.append(f"{table} must be one table: write [{table}], once, got {type(tables[table]).__name__}")
+        found = tables.get(table, {})
+        several = table == "source" and isinstance(found, list) and found and all(isinstance(t, dict) for t in found)
+        if not isinstance(found, dict) and not several:
+            problems.append(f"{table} must be one table: write [{table}], once, got {type(found).__name__}")
             del tables[table]
     opened, limited = None if recorded else folder, False
     if "speed_limit_from" in text:
@@ -129,10 +121,6 @@ def parse_scene(
     if problems:
         raise SceneError(problems, name)
     return scene
-
-
-def _is_array_of_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 
 def _recording(tables: Mapping[str, Any], folder: Path, problems: list[str]) -> s.RecordingScene | None:

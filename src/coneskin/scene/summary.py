@@ -44,13 +44,7 @@ def _missing_tiers(scene: Scene, arm: ArmScene) -> list[str]:
     model = arm.arm_model
     if is_ur(model):
         return []
-    from coneskin.robot.driver.protocol import (
-        HeartbeatDriver,
-        ProgramDriver,
-        SetpointDriver,
-        SliderDriver,
-        require,
-    )
+    from coneskin.robot.driver.protocol import HeartbeatDriver, ProgramDriver, SetpointDriver, SliderDriver, require
 
     internal, lines = arm.control == "internal", []
     slows = "slow" in {scene.default_reaction.kind, *(rule.reaction.kind for rule in scene.rules)}

@@ -17,7 +17,6 @@ from .reader import TUBE_LENGTHS
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
-    from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose
     from coneskin.robot.arm.model import ArmModel
 
@@ -30,7 +29,7 @@ _SMALL = 2e-3  # m; a pose in metres that was taken for millimetres is nearer th
 _BEYOND, _BESIDE, _TILT = 0.05, 0.03, math.radians(20.0)  # m, m, rad, by which a sensor may be off its tube
 _OVERLAP = 1e-3  # m
 _ON_TOP = 3e-3  # m; a sensor that is wider by that is meant to lie on the other one
-_ROOM = 0.5  # part of the distance between two tubes that one of them may fill
+_ROOM = 0.5  # part of the distance between the axes of two tubes, along that of the elbow, that one of them may fill
 _FRAME_BITS = 360  # of a frame of 36 bytes on a serial line
 _SLOW = 100.0  # Hz, docs/look-up/wire-format.md
 _BUILT_IN = 921600  # baud
@@ -105,7 +104,7 @@ def _placing(scene: Scene) -> Iterator[str]:
 
 def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     """Compare the sensors of a tube with its axis and its neighbour."""
-    from coneskin.robot.arm.kinematics import MESHED_ARMS, link_index, link_name
+    from coneskin.robot.arm.kinematics import MESHED_ARMS, link_index, link_mesh, link_name
     from coneskin.robot.arm.models import arm_model
 
     name = link_name(link_index(link.name))
@@ -115,7 +114,7 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     if arm.name not in MESHED_ARMS and link.frame != "mesh":
         return
     length = abs(arm.a[TUBE_LENGTHS[name]])
-    room = _ROOM * _tube_distance(arm)
+    room = _ROOM * abs(link_mesh(arm, "upper_arm").translation[2] - link_mesh(arm, "forearm").translation[2])
     for item in link.sensors:
         where, cone = f"link {link.name}, {item.sensor.name}", item.sensor.frustum
         in_mesh = _mesh_frame(link, arm) @ item.placed.link_frustum
@@ -146,13 +145,6 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
             )
 
 
-def _tube_distance(arm: ArmModel) -> float:
-    """Return the distance between the axes of upper arm and forearm, along the axis of the elbow [m]."""
-    from coneskin.robot.arm.kinematics import link_mesh
-
-    return abs(link_mesh(arm, "upper_arm").translation[2] - link_mesh(arm, "forearm").translation[2])
-
-
 def _mesh_frame(link: LinkScene, arm: ArmModel) -> Pose:
     """Return the pose of the link's frame of the scene in the frame of its mesh."""
     from coneskin.geometry.pose import Pose
@@ -175,10 +167,6 @@ def _overlap(first: PlacedSensor, second: PlacedSensor) -> bool:
     low, high = min(begin[2], end[2]), max(begin[2], end[2])
     if min(high, one.frustum.height) - max(low, 0.0) < _OVERLAP:
         return False
-    return _share_azimuth(one, other, relative)
-
-
-def _share_azimuth(one: PlacedFrustum, other: PlacedFrustum, relative: Pose) -> bool:
     x, y, _ = relative.rotate((math.cos(0.5 * other.frustum.wrap), math.sin(0.5 * other.frustum.wrap), 0.0))
     between = abs(math.remainder(math.atan2(y, x) - 0.5 * one.frustum.wrap, _TURN))
     return between < 0.5 * (one.frustum.wrap + other.frustum.wrap) - 1e-3

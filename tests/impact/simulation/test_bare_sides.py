@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from coneskin.geometry.pose import Vector
@@ -14,16 +15,20 @@ from coneskin.robot.guard.signals.journal import EventName
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene
+from coneskin.skin.materials import Padding
 from tests.support.bare_parts import bare_parts_of
 from tests.support.scenes import commissioned, forearm_scene
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
 from coneskin.impact.simulation.collision_run import CollisionRun
+from coneskin.impact.simulation.mujoco_plant import MujocoPlant
+from coneskin.impact.simulation.scene_description import SheetOnLink
 
 Q = tuple(math.radians(angle) for angle in (-2.0, -90.0, 90.0, -90.0, -90.0, 0.0))
 PUSH = 5.0  # N
 U, PHI = 0.13, math.radians(150.0)
+PAD = Padding()
 
 
 def pushed(reaction: str, gap: float = 0.01) -> tuple[CollisionRun, float]:
@@ -68,3 +73,32 @@ def test_where_a_bare_side_would_lead_the_arm_only_stops_unless_the_scene_allows
     assert "no skin covers the" in latched.details["why"]
     assert run.event(EventName.RETREATING) is None
     assert force == 0.0
+
+
+def test_no_way_from_the_skin_onto_the_strip_and_off_it_gives_energy() -> None:
+    """Pressed into the pad, a ball slid onto the lacquer, whose force at that depth is twenty times the pad's."""
+    model, depth, radius = arm_model("UR5e"), 1e-3, 0.03
+    text = forearm_scene().replace("height_mm", "wrap_deg = 300\nheight_mm")
+    (skin,) = place_on_arm(parse_scene(text))
+    pose, wrap = link_pose(model, Q, skin.link), skin.frustum.frustum.wrap
+
+    def middle(phi: float, away: float) -> Vector:
+        side = scaled(pose.rotate(skin.frustum.normal(phi)), radius + away)
+        return added(pose.apply(skin.frustum.point(U, phi)), side)
+
+    off, on = math.radians(-25.0), math.radians(15.0)
+    way = [(off, 1e-5 * (50 - k)) for k in range(151)]  # in, along, and out
+    way += [(off + (on - off) * k / 800.0, -depth) for k in range(801)]
+    way += [(on, 1e-5 * (k - 100)) for k in range(151)]
+    places = [middle(wrap + phi, away) for phi, away in way]
+    plant = MujocoPlant(
+        model, [SheetOnLink("it", skin.link, skin.frustum)], [BodyScene("mass", places[0], radius=radius)], PAD, Q
+    )
+    forces = []
+    for place in places:
+        plant._d.qpos[6:9] = [a - b for a, b in zip(place, places[0], strict=True)]
+        plant._look()
+        forces.append(sum((contact.force * np.array(contact.normal) for contact in plant.contacts), np.zeros(3)))
+    steps = np.diff(np.array(places), axis=0)
+    work = float(np.sum(0.5 * (np.array(forces[1:]) + np.array(forces[:-1])) * steps))
+    assert -1.5 * PAD.energy(depth) < work < 0.1 * PAD.energy(depth)  # what was in the pad is lost

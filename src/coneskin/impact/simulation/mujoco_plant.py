@@ -94,6 +94,7 @@ class _BodyContact(NamedTuple):
     rate: float  #: its growth [m/s]
     force: float  #: [N]
     normal: Vector  #: outward unit normal of the skin, in the base frame
+    bare: bool  #: no skin is there
 
 
 class Touch(NamedTuple):
@@ -222,7 +223,7 @@ class MujocoPlant:
             skin = self._sheets[contact.sheet]
             cone = skin.cone.frustum
             active = 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap
-            if contact.sheet < self._skins and active:  # no bare part
+            if active and not contact.bare:
                 found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
         return found
 
@@ -323,7 +324,10 @@ class MujocoPlant:
                 self._m.qpos_spring[at : at + 3] = part.rest
 
     def _find(self, near: float = 0.0) -> list[Touch]:
-        """Return what touches, or is nearer than that [m]: one contact for each skin and part, amid MuJoCo's points."""
+        """Return what touches, or is nearer than that [m]: one contact for each skin and part, amid MuJoCo's points.
+
+        A second one is that of a part beside the end of a sheet with the strip beyond it (``_edge``).
+        """
         d = self._d
         if not d.ncon:
             return []
@@ -339,7 +343,9 @@ class MujocoPlant:
                 key = self._sheet_of[pair[0]], self._part_of[pair[1]]
                 points.setdefault(key, []).append((-distance, index, -1.0 if swapped else 1.0))
         frames, places = contact.frame, contact.pos
-        return [self._touch(*key, found, frames, places) for key, found in points.items()]
+        touches = [self._touch(*key, found, frames, places) for key, found in points.items()]
+        edges = [edge for touch in touches if (edge := self._edge(touch)) is not None and edge.depth > -near]
+        return touches + edges
 
     def _touch(
         self,
@@ -355,6 +361,32 @@ class MujocoPlant:
         if len(found) > 1:
             whole = math.fsum(item[0] for item in found)
             point = sum((item[0] / whole * places[item[1]] for item in found), np.zeros(3))
+        return self._made(sheet, part, depth, normal, point, self._is_bare(sheet, point))
+
+    def _edge(self, touch: Touch) -> Touch | None:
+        """Return the contact of what presses a skin with the end of the lacquer beside it. None where there is none.
+
+        Skin and strip have one height. What is deep in the pad reaches beyond the end of the sheet, as deep as the
+        curvature of the body leaves. Else its force would jump as the deepest point slides over the end, by hundreds of
+        newtons at a millimetre, with energy from nowhere.
+        """
+        cone, body = self._sheets[touch.sheet].cone, self.parts[touch.part].body
+        if touch.bare or cone.frustum.wrap == math.tau:
+            return None
+        u, phi, _ = self._locate(touch.sheet, touch.point)
+        end = 0.0 if 2.0 * phi < cone.frustum.wrap else cone.frustum.wrap
+        surface, point = self._place(touch.sheet, u, phi), self._place(touch.sheet, u, end)
+        normal, depth = touch.normal, touch.depth - float(touch.normal @ (surface - point))
+        if body.kind != "wall":
+            way = surface - point + (body.radius - touch.depth) * normal  # from the end to the middle of the body
+            if body.kind == "post":
+                axis = np.asarray(body.axis)
+                way = way - float(way @ axis) * axis
+            size = float(np.linalg.norm(way))
+            normal, depth = way / size, body.radius - size
+        return self._made(touch.sheet, touch.part, depth, normal, point, True)
+
+    def _made(self, sheet: int, part: int, depth: float, normal: Floats, point: Floats, bare: bool) -> Touch:
         jacobian = np.empty((3, self._m.nv))
         self._mj.mj_jac(self._m, self._d, jacobian, None, point, self._links[sheet])
         jacobian = jacobian[:, :_ARM_DOF]
@@ -362,7 +394,7 @@ class MujocoPlant:
         if (at := self._address[part]) is not None:
             speed -= self._d.qvel[at : at + 3]
         rate = float(speed @ normal)
-        touch = Touch(sheet, part, depth, rate, 0.0, normal, point, jacobian, self._is_bare(sheet, point))
+        touch = Touch(sheet, part, depth, rate, 0.0, normal, point, jacobian, bare)
         return touch._replace(force=self._law(touch).force(depth, rate))
 
     def _is_bare(self, sheet: int, point: Floats) -> bool:
@@ -382,7 +414,15 @@ class MujocoPlant:
         u, phi, distance = self._sheets[sheet].cone.locate(self._back[sheet].apply((x, y, z)))
         return u, phi % math.tau, distance
 
+    def _place(self, sheet: int, u: float, phi: float) -> Floats:
+        """Return a point of a sheet's side in the base frame [m]; the inverse of ``_locate``."""
+        link = self._links[sheet]
+        inside = self._back[sheet].inverse().apply(self._sheets[sheet].cone.point(u, phi))
+        place: Floats = self._d.xmat[link].reshape(3, 3) @ np.asarray(inside) + self._d.xpos[link]
+        return place
+
     def _contact(self, touch: Touch) -> _BodyContact:
         u, phi, _ = self._locate(touch.sheet, touch.point)
         x, y, z = touch.normal.tolist()
-        return _BodyContact(touch.sheet, touch.part, u, phi, touch.depth, touch.rate, touch.force, (x, y, z))
+        where = touch.sheet, touch.part, u, phi
+        return _BodyContact(*where, touch.depth, touch.rate, touch.force, (x, y, z), touch.bare)

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from datetime import datetime
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -193,11 +194,8 @@ def _text(device_id: int, records: Sequence[CalibrationRecord]) -> str:
 
 
 def _old_path(path: Path, day: str) -> Path:
-    number, old = 1, path.with_name(f"{path.stem}.until-{day}.json")
-    while old.exists():
-        number += 1
-        old = path.with_name(f"{path.stem}.until-{day}-{number}.json")
-    return old
+    names = (f"{path.stem}.until-{day}{f'-{number}' if number > 1 else ''}.json" for number in count(1))
+    return next(old for name in names if not (old := path.with_name(name)).exists())
 
 
 def _find_calibration(path: Path, sensor: Sensor, simulated: bool) -> CalibrationRecord:

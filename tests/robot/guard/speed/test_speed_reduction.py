@@ -4,7 +4,9 @@ import pytest
 
 from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.driver.values import ControllerState, SetSpeedSlider, StopPath
+from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
 from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME, SpeedReduction, _ReducedSpeedTouch
+from coneskin.robot.reaction.contact_supervision import ContactApproach
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
@@ -16,7 +18,11 @@ SLOW = 0.05  # m/s
 
 
 def slowing(speed=1.0, before=1.0, fraction=0.2):
-    return _ReducedSpeedTouch([speed, speed], before, min(before, fraction), 10.2, 11.0, SLOW)
+    arm = arm_model("UR5e")
+    torque = OutsideTorque(arm)
+    approach = ContactApproach(arm, ZERO_VELOCITY, ZERO_VELOCITY, 10.0, 5e-4)
+    setting = [speed, speed], before, min(before, fraction), 10.2, 11.0, SLOW
+    return _ReducedSpeedTouch(*setting, approach, torque, ResistanceMonitor(arm, torque, True))
 
 
 def fast(one, time, speed):
