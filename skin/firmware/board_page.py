@@ -65,12 +65,11 @@ def board_page(circuit: BoardCircuit) -> str:
         *(f"    {line}" for line in circuit.scene_lines.splitlines()),
         "",
     ]
-    settings = _settings(circuit)
-    if settings:
+    if settings := _settings(circuit):
         lines += [
             "Settings, each a line over the serial port, then `save`:",
             "",
-            *(f"    {line}" for line in settings),
+            *(f"    {one}" for one in settings),
             "",
         ]
     return "\n".join(lines)

@@ -12,6 +12,7 @@ import re
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from coneskin.core.channel import wait_readable
@@ -46,6 +47,14 @@ def find_ports() -> list[PortFacts]:
         description = port.description if port.description not in (None, "n/a", port.name) else ""
         found.append(PortFacts(port.device, description, port.hwid if port.hwid not in (None, "n/a") else ""))
     return found
+
+
+def port_group(device: Path) -> str:
+    """Return the group whose members may use a port."""
+    try:
+        return device.group()
+    except (KeyError, OSError, NotImplementedError):  # a number without a name; Windows has none
+        return "dialout"
 
 
 _MAX_READ = 4096  # bytes in one read

@@ -203,20 +203,14 @@ class SourceGroup(Source):
         deadline = time.monotonic() + timeout
         left = timeout
         while True:
-            data = self._read_ready(left) if self._poll is not None else self._read_in_turn()
-            if data:
+            ready, wait = list(self._sources), _TURN_TIME
+            if self._poll is not None:
+                ready, wait = [self._by_descriptor[number] for number, _ in self._poll.poll(max(left, 0.0))], 0.0
+            if data := b"".join(self._read_one(source, wait) for source in ready):
                 return data
             left = deadline - time.monotonic()
             if left <= 0.0:
                 raise SkinTimeout(f"{self.name}: no bytes for {timeout * 1e3:.0f} ms")
-
-    def _read_ready(self, timeout: float) -> bytes:
-        return b"".join(
-            self._read_one(self._by_descriptor[descriptor], 0.0) for descriptor, _ in self._poll.poll(max(timeout, 0.0))
-        )
-
-    def _read_in_turn(self) -> bytes:
-        return b"".join(self._read_one(source, _TURN_TIME) for source in self._sources)
 
     def _read_one(self, source: Source, timeout: float) -> bytes:
         try:

@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -236,11 +236,9 @@ def _open_output(path: Path) -> BinaryIO:
 
 def _write_packets(skin: VirtualSkin, file: BinaryIO) -> int:
     count = 0
-    try:
+    with suppress(SkinConnectionError):  # unplugged, on purpose
         for _, data in skin.packets():
             count += file.write(data)
-    except SkinConnectionError:
-        pass  # unplugged, on purpose
     return count
 
 

@@ -349,11 +349,9 @@ class PressedSkin(VirtualSkin):
         foam, layers = self.imperfections.foam, self.imperfections.layers
         found: dict[str, list[LayerContact]] = {}
         kept: dict[Hashable, tuple[float, Press]] = {}
-        for body in dict.fromkeys((*self._delayed, *presses)):
-            before, last = self._delayed.get(body, (0.0, None))
-            press = presses.get(body) or (last._replace(force=0.0) if last is not None else None)
-            if press is None:
-                continue
+        gone = {body: last._replace(force=0.0) for body, (_, last) in self._delayed.items()}
+        for body, press in {**gone, **presses}.items():
+            before = self._delayed[body][0] if body in self._delayed else 0.0
             state = foam.advance(before, press.force, step)
             if press.force > 0.0 or state > _FORGOTTEN_FORCE:
                 kept[body] = state, press

@@ -26,7 +26,6 @@ from .terminal import TouchTerminal, add_touch_options
 
 if TYPE_CHECKING:
     from coneskin.commissioning.calibration.calibrate import CalibrationResult
-    from coneskin.scene.values.scene import Scene
 
 _DEFAULT_FOLDER = "calibrations"
 #: of a calibration, in the JSON object of its result
@@ -64,14 +63,6 @@ def _forces(text: str) -> tuple[float, ...]:
     return values
 
 
-def _check_names(scene: Scene, built: Scene) -> None:
-    """Refuse a virtual skin whose sensors are not those that are touched."""
-    names, others = ({placed.sensor.name for placed in each.sensors} for each in (scene, built))
-    if names != others:
-        said = f"{', '.join(sorted(names))}, got {', '.join(sorted(others)) or 'none'}"
-        raise SceneError([f"--skin must have the sensors of {scene.name}: {said}"], built.name)
-
-
 def run(args: argparse.Namespace) -> int:
     """Calibrate the skin of a scene, or list its marks."""
     from coneskin.commissioning.calibration.calibrate import Calibrator
@@ -85,8 +76,10 @@ def run(args: argparse.Namespace) -> int:
     if args.skin and not args.simulated:
         raise SceneError(["--skin says how a virtual skin was built: give --simulated too"], scene.name)
     built = load_scene(args.skin, calibrated=False) if args.skin else None
-    if built is not None:
-        _check_names(scene, built)
+    names, others = ({one.sensor.name for one in each.sensors} for each in (scene, built or scene))
+    if built is not None and names != others:
+        said = f"{', '.join(sorted(names))}, got {', '.join(sorted(others)) or 'none'}"
+        raise SceneError([f"--skin must have the sensors of {scene.name}: {said}"], built.name)
     simulated = args.simulated or (args.list and scene.source is not None and is_simulated(scene.source.kind))
     check_touchable(scene, simulated)  # before the terminal is read
     terminal = TouchTerminal(args)

@@ -131,17 +131,16 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
         text = set_sensor_keys(text, names.index(patch.sensor), patch.keys)
     parse_scene(text, scene.name, scene.folder)
     print(f"\n{diff_texts(old, text, str(args.scene))}", file=sys.stderr, flush=True)
-    if not (args.yes or (not args.json and _agrees())):
+    agreed = args.yes
+    if not (args.yes or args.json):
+        print("change the scene so? [y/N] ", end="", file=sys.stderr, flush=True)
+        agreed = sys.stdin.readline().strip().lower() in ("y", "yes")
+    if not agreed:
         print(f"coneskin doctor: {args.scene} was left as it is", file=sys.stderr)
         return
     with explain_os_error(lambda why: SceneError([why], str(args.scene)), "it cannot be written"):
         write_whole(args.scene, text)
     print(f"coneskin doctor: {args.scene} was changed; run it again", file=sys.stderr)
-
-
-def _agrees() -> bool:
-    print("change the scene so? [y/N] ", end="", file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip().lower() in ("y", "yes")
 
 
 def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:

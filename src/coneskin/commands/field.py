@@ -87,9 +87,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"resistance A to B  {radial_ohm:10.1f} ohm")
     print(f"resistance C to D  {angular_ohm:10.1f} ohm")
     print(f"largest error, contact of {args.contact_mm:g} mm: u {facts['largest_u_error_mm']:.3f} mm, ", end="")
-    print(f"phi {facts['largest_phi_error_deg']:.3f} deg")
-    for path in pictures:
-        print(f"wrote {path}")
+    print(f"phi {facts['largest_phi_error_deg']:.3f} deg", *(f"wrote {path}" for path in pictures), sep="\n")
     return 0
 
 

@@ -247,14 +247,11 @@ class LivePage:
             _set(self._clock, f'<div id="coneskin-clock" {told}>{at:.3f} s into the run</div>')
         if now - self._plotted >= _PLOT_PERIOD:
             self._plotted = now
-            self._draw_past(course, at)
+            since = max(at - _TIMELINE_SPAN, course.history.since - course.zero)  # axes end with what is there
+            _set(self._past, timeline([course], since, at) + trace_drawings([course], since, at, live=True))
             with self._entering:
                 for choice in self._choices.values():
                     choice.show([moment])
-
-    def _draw_past(self, course: RunCourse, at: float) -> None:
-        since = max(at - _TIMELINE_SPAN, course.history.since - course.zero)  # axes end with what is there
-        _set(self._past, timeline([course], since, at) + trace_drawings([course], since, at, live=True))
 
     def _enter(self, client: Any) -> Callable[[], None]:
         """Give a viewer its choice of potentials; return what takes it away."""

@@ -17,6 +17,7 @@ from .marks import place_sensors
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from coneskin.core.arrays import Floats
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
@@ -76,8 +77,8 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
 
     assert placed.model is not None
     cone, base_link = item.sensor.frustum, link_pose(placed.model, q, placed.link)
+    turns = [cone.wrap * k / (_CURVE_POINTS - 1) for k in range(_CURVE_POINTS)]
     for part in (0.0, 0.5, 1.0):
-        turns = [cone.wrap * k / (_CURVE_POINTS - 1) for k in range(_CURVE_POINTS)]
         ring = [base_link.apply(placed.frustum.point(part * cone.slant, phi)) for phi in turns]
         axes.plot(*zip(*ring, strict=True), lw=1.0, color="tab:green")
     length = 1.2 * max(cone.radius1, cone.radius2)
@@ -91,8 +92,7 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
     reach = 0.5 * cone.slant + 2.0 * length
     corners = skeleton(placed.model, q)
     for start, end in itertools.pairwise(corners):
-        inside = _inside(start, end, middle, reach)
-        axes.plot(*zip(*inside, strict=True), "-", lw=4, color="0.8")
+        axes.plot(*_inside(start, end, middle, reach).T, "-", lw=4, color="0.8")
     for centre, setter in zip(middle, (axes.set_xlim, axes.set_ylim, axes.set_zlim), strict=True):
         setter(centre - reach, centre + reach)
     axes.set_box_aspect((1, 1, 1), zoom=0.9)
@@ -106,11 +106,10 @@ def _draw_arm(axes: Any, item: SensorMarks, placed: SensorOnArm, q: Sequence[flo
     axes.set_title(f"{placed.link_name} as the arm stands; arrows: fingers, green: sensor, grey: arm", fontsize=10)
 
 
-def _inside(start: Sequence[float], end: Sequence[float], middle: Sequence[float], reach: float) -> list[list[float]]:
+def _inside(start: Sequence[float], end: Sequence[float], middle: Sequence[float], reach: float) -> Floats:
     """Return the points of a line that lie in the drawn box: what is beyond would run over the labels of its axes."""
-    steps = [k / (_CURVE_POINTS - 1) for k in range(_CURVE_POINTS)]
-    points = [[a + step * (b - a) for a, b in zip(start, end, strict=True)] for step in steps]
-    return [
-        point if all(abs(x - m) <= reach for x, m in zip(point, middle, strict=True)) else [math.nan] * 3
-        for point in points
-    ]
+    import numpy as np
+
+    points: Floats = np.linspace(start, end, _CURVE_POINTS)
+    points[np.abs(points - middle).max(axis=1) > reach] = np.nan
+    return points

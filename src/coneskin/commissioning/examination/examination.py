@@ -10,11 +10,10 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.commissioning.line.port_search import port_group
 from coneskin.commissioning.skin_watch import skin_source
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
@@ -22,6 +21,7 @@ from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.suspicions import suspicions
 from coneskin.skin.sources.kinds import is_simulated
+from coneskin.skin.sources.serial_port import find_ports, port_group
 
 from .guided_touches import examine_touches, guided_touches
 from .hold_ups import begin_measurement, examine_hold_ups
@@ -78,21 +78,16 @@ class Doctor:
 
     def examine(self) -> None:
         """Examine everything that the scene names, and meanwhile the computer."""
-        if not self._hold_up_time:
-            self._examine_scene()
-            return
-        with begin_measurement(self._hold_up_time) as measurement:
-            self._examine_scene()
-            self.note(examine_hold_ups(measurement))
-
-    def _examine_scene(self) -> None:
-        self.note(*_packages(self.scene))
-        self.note(*(one for one in suspicions(self.scene) if one.item != "packages"))
-        self._examine_source()
-        if self.scene.arm is None:
-            self.note(Finding("arm", "not tried", "the scene has no [arm]"))
-        else:
-            self.note(*_arm(self.scene, self.scene.arm))
+        with begin_measurement(self._hold_up_time) if self._hold_up_time else nullcontext() as measurement:
+            self.note(*_packages(self.scene))
+            self.note(*(one for one in suspicions(self.scene) if one.item != "packages"))
+            self._examine_source()
+            if self.scene.arm is None:
+                self.note(Finding("arm", "not tried", "the scene has no [arm]"))
+            else:
+                self.note(*_arm(self.scene, self.scene.arm))
+            if measurement is not None:
+                self.note(examine_hold_ups(measurement))
 
     def note(self, *findings: Finding) -> None:
         """Keep and tell findings."""
@@ -195,8 +190,6 @@ def _port(source: SourceScene) -> Iterator[Finding]:
         return
     path, item = Path(name), "skin, permission"
     if not path.exists():
-        from coneskin.skin.sources.serial_port import find_ports
-
         there = ", ".join(map(str, find_ports())) or "none at all"
         yield Finding(item, "bad", f"there is no {name}; present: {there}", "", "plug it in, or correct source.port")
     elif not os.access(path, os.R_OK | os.W_OK):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.commissioning.line.port_search import await_port, port_trouble, stable_name
+from coneskin.commands.find_port import await_port, port_trouble, stable_name
 from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import PortFacts
 
