@@ -22,8 +22,8 @@ from bench.report import head
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
-from coneskin.robot.sim.ports.program_file import ProgramFolder
 from coneskin.robot.sim.ports.rtde import RtdeOutputs
+from coneskin.robot.sim.ports.user_interface import ProgramFolder
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
 

@@ -25,7 +25,7 @@ from typing import Any
 
 from bench.report import head, quantile
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack_outputs_request, pack_start_request, split
+from coneskin.robot.ur.rtde_codec import PacketKind, Recipe, pack, pack_outputs_request, split
 
 START_JOINTS = (0.0, -1.4, 1.5, -1.7, -1.4, 0.2)
 # command -> event in the controller's log for its arrival, and for its execution
@@ -51,7 +51,7 @@ class Reader(threading.Thread):
         super().__init__(daemon=True)
         self.socket = socket.create_connection((host, 30004))
         self.recipe = Recipe(("timestamp", "actual_qd"))
-        self.socket.sendall(pack_outputs_request(self.recipe.names) + pack_start_request())
+        self.socket.sendall(pack_outputs_request(self.recipe.names) + pack(PacketKind.START))
         self.samples: list[tuple[float, float]] = []
 
     def run(self) -> None:

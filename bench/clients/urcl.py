@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL
+from coneskin.robot.sim.ports.user_interface import EXTERNAL_CONTROL
 from coneskin.robot.sim.process import SimulatedController, free_host
 
 #: joint positions with which Universal Robots' own simulator starts [rad]

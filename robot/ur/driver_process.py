@@ -43,18 +43,11 @@ _MAX_DURATION = 10.0  # s for which a speed or a position may hold
 
 
 class _RequestOutcome(NamedTuple):
-    """What a request has led to.
+    """What a request has led to."""
 
-    Attributes:
-        started: it has started a motion, which replaces the one before.
-        holds: time after which what it has started is void [s], counted from when it was sent.
-        waits: the program wants the answer at the end of the motion.
-        answer: what else the answer says.
-    """
-
-    started: bool = False
-    holds: float = math.inf
-    waits: bool = False
+    started: bool = False  #: it has started a motion, which replaces the one before
+    holds: float = math.inf  #: time after which what it has started is void [s], counted from when it was sent
+    waits: bool = False  #: the program wants the answer at the end of the motion
     answer: dict[str, Any] = {}  # noqa: RUF012 (never changed)
 
 
@@ -170,18 +163,14 @@ class DriverProcess:
         deceleration: float = 10.0,
         request_lifetime: float = 0.2,
     ) -> None:
-        self._clock = clock
-        self._on_end = on_end
+        self._arm, self._guard, self._program = arm, guard, program
+        self._clock, self._on_end, self._work = clock, on_end, work
         self._quit = False
         self._heard = clock()
-        self._arm = arm
-        self._guard = guard
-        self._program = program
         self._allowed = False
         self._patience = math.inf  # s for which the guard may be silent; without limit while nothing moves
         self._waiting: list[int] = []  # numbers of the requests whose end the program waits for
         self._expires = math.inf  # when the speeds or positions of the program are void
-        self._work = work
         self._request_lifetime = request_lifetime
         self._kicked = -1.0
         self._deceleration = deceleration
@@ -220,9 +209,7 @@ class DriverProcess:
             if self._guard.closed:
                 return False
             self._serve_program(message)
-        if self._guard.closed:
-            return False
-        if self._program.closed:
+        if self._guard.closed or self._program.closed:
             return False
         if self._waiting and not self._arm.moving():
             self._answer_waiting(ok=True)
@@ -274,19 +261,21 @@ class DriverProcess:
         self._allowed, self._patience = False, math.inf
         self._answer_waiting(ok=False, stopped=True, why=why)
         self._guard.send(StatusReport("error", why).encode())
-        try:
-            self._stop(self._deceleration)
-        except ConeSkinError as exc:
-            self._guard.send(StatusReport("error", str(exc)).encode())
+        self._try_to_stop()
 
     def _expire(self) -> None:
         """Stop what the program has not renewed."""
         what = "no new speed or servo command of the program has come in time: the arm was stopped"
-        try:
-            self._stop(self._deceleration, at_once=False)
+        if self._try_to_stop(at_once=False):
             self._guard.send(StatusReport("remark", what).encode())
+
+    def _try_to_stop(self, at_once: bool = True) -> bool:
+        try:
+            self._stop(self._deceleration, at_once)
         except ConeSkinError as exc:
             self._guard.send(StatusReport("error", str(exc)).encode())
+            return False
+        return True
 
     def _stop(self, deceleration: float, at_once: bool = True) -> None:
         self._expires = math.inf

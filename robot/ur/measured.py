@@ -15,7 +15,7 @@ from typing import Any
 
 from coneskin.core.errors import RobotRefused
 from coneskin.core.files import read_file
-from coneskin.core.finding import Finding
+from coneskin.core.finding import Finding, Verdict
 from coneskin.core.text import read_json
 
 _MAX_SIZE = 1 << 20  # bytes
@@ -80,28 +80,25 @@ def compare(
         stop_budget: returns the time that it gives a stop [s], of a speed [rad/s] and a deceleration [rad/s2].
         watchdog_hz: of the scene's arm.
     """
-    start = measured.start[1]
+    start, slows, late = measured.start[1], measured.slows, measured.watchdog[1]
     found = [Finding("measured, controller", "ok", measured.what)]
-    needed = math.ceil(1e3 * _LIMIT_MARGIN * max(start, measured.slows))
-    fits = max(start, measured.slows) <= escalate
-    value = (
-        f"a program starts after {1e3 * start:.0f} ms (p95), a stop shows after {1e3 * measured.slows:.0f} ms (worst)"
-    )
-    remedy = "" if fits else f"escalate_ms = {needed} in [monitoring]; else each stop goes on to the next path"
-    found.append(
-        Finding("measured, start of a program", "ok" if fits else "bad", value, f"{1e3 * escalate:g} ms", remedy)
-    )
-    late = measured.watchdog[1]
-    wanted = math.ceil(10.0 / max(0.01, _WATCHDOG_TIME - late)) / 10.0
-    fits = late <= _WATCHDOG_LATENESS or watchdog_hz >= wanted
+
+    def judge(item: str, fits: bool, value: str, rule: str, remedy: str, wrong: Verdict = "warning") -> None:
+        found.append(Finding(f"measured, {item}", "ok" if fits else wrong, value, rule, "" if fits else remedy))
+
+    value = f"a program starts after {1e3 * start:.0f} ms (p95), a stop shows after {1e3 * slows:.0f} ms (worst)"
+    needed = math.ceil(1e3 * _LIMIT_MARGIN * max(start, slows))
+    remedy = f"escalate_ms = {needed} in [monitoring]; else each stop goes on to the next path"
+    judge("start of a program", max(start, slows) <= escalate, value, f"{1e3 * escalate:g} ms", remedy, "bad")
     value = f"it ends a program {1e3 * late:.0f} ms after its period (worst)"
-    remedy = "" if fits else f"watchdog_hz = {wanted:g} in [arm]; else a program without its guard goes on for longer"
     rule = f"{1e3 * _WATCHDOG_LATENESS:g} ms, or {1e3 * _WATCHDOG_TIME:g} ms with the period"
-    found.append(Finding("measured, watchdog", "ok" if fits else "warning", value, rule, remedy))
+    wanted = math.ceil(10.0 / max(0.01, _WATCHDOG_TIME - late)) / 10.0
+    remedy = f"watchdog_hz = {wanted:g} in [arm]; else a program without its guard goes on for longer"
+    judge("watchdog", late <= _WATCHDOG_LATENESS or watchdog_hz >= wanted, value, rule, remedy)
     for path, motion, speed, stood in measured.stops:
         budget = stop_budget(speed, MEASURED_DECELERATION)
         if path != "slider" and stood > budget:
             value = f"{path} stops {motion} from {speed:.2f} rad/s in {1e3 * stood:.0f} ms (worst)"
             remedy = f"deceleration_rad_s2 = {0.8 * speed / max(stood - 4.0 * escalate, 1e-3):.1f}, or a lower speed"
-            found.append(Finding("measured, stop", "warning", value, f"{1e3 * budget:.0f} ms", remedy))
+            judge("stop", False, value, f"{1e3 * budget:.0f} ms", remedy)
     return found

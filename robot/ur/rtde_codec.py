@@ -190,23 +190,21 @@ class Recipe:
 
     Attributes:
         names: the variables, in order.
-        types: their types on the wire.
         ident: the id that stands in the first byte of each data packet.
         size: the length of a data packet's payload [bytes], the id included.
     """
 
-    __slots__ = ("_scalar", "_spans", "_struct", "ident", "names", "size", "types")
+    __slots__ = ("_scalar", "_spans", "_struct", "ident", "names", "size")
 
     def __init__(self, names: Sequence[str], ident: int = 1) -> None:
         unknown = [name for name in names if name not in VARIABLES]
         if unknown:
             raise ValueError(f"RTDE has no variable named {', '.join(unknown)}")
         self.names = tuple(names)
-        self.types = tuple(VARIABLES[name] for name in names)
         self.ident = ident
         layout, spans, start = ">B", [], 1
-        for kind in self.types:
-            code, count = _WIRE_TYPES[kind]
+        for name in names:
+            code, count = _WIRE_TYPES[VARIABLES[name]]
             layout += f"{count}{code}" if count > 1 else code
             spans.append((start, start + count) if count > 1 else (start, 0))
             start += count
@@ -270,11 +268,6 @@ class Recipe:
 # What a client asks while it sets a connection up.
 
 
-def pack_version_request(version: int = PROTOCOL_VERSION) -> bytes:
-    """Return the request for a protocol version; the reply's payload is one byte, 1 for accepted."""
-    return pack(PacketKind.PROTOCOL_VERSION, struct.pack(">H", version))
-
-
 def pack_outputs_request(names: Sequence[str], frequency_hz: float = 500.0) -> bytes:
     """Return the request for outputs at a frequency [Hz]; the reply goes to `unpack_types`."""
     return pack(PacketKind.OUTPUTS, struct.pack(">d", frequency_hz) + ",".join(names).encode("ascii"))
@@ -283,11 +276,6 @@ def pack_outputs_request(names: Sequence[str], frequency_hz: float = 500.0) -> b
 def pack_inputs_request(names: Sequence[str]) -> bytes:
     """Return the request for sole use of inputs; the reply goes to `unpack_types`."""
     return pack(PacketKind.INPUTS, ",".join(names).encode("ascii"))
-
-
-def pack_start_request() -> bytes:
-    """Return the request to start the stream of data; the reply's payload is one byte, 1 for accepted."""
-    return pack(PacketKind.START)
 
 
 def split_names(text: bytes) -> tuple[str, ...]:

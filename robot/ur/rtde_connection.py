@@ -36,7 +36,8 @@ class RtdeConnection(TcpReader):
     def prepare(self) -> None:
         """Agree on the version of the protocol."""
         self._waiting: list[bytes] = []
-        if self._ask(rtde.pack_version_request(), rtde.PacketKind.PROTOCOL_VERSION) != b"\x01":
+        kind = rtde.PacketKind.PROTOCOL_VERSION
+        if self._ask(rtde.pack(kind, struct.pack(">H", rtde.PROTOCOL_VERSION)), kind) != b"\x01":
             raise RobotConnectionError(f"{self.host}:{self.port} does not speak RTDE version {rtde.PROTOCOL_VERSION}")
 
     def split(self, data: bytes) -> tuple[list[bytes], bytes]:
@@ -72,7 +73,7 @@ class RtdeConnection(TcpReader):
 
     def start(self) -> None:
         """Let the data flow; from now on nothing waits."""
-        if self._ask(rtde.pack_start_request(), rtde.PacketKind.START) != b"\x01":
+        if self._ask(rtde.pack(rtde.PacketKind.START), rtde.PacketKind.START) != b"\x01":
             self.close()
             raise RobotConnectionError(f"{self.host}:{self.port} does not start its RTDE output")
         super().prepare()

@@ -90,20 +90,6 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
 
     # kinematics
 
-    def get_inverse_kin_has_solution(self, x: Any, *_: Any) -> bool:
-        """Return whether a tool pose can be reached."""
-        return bool(solutions(self._arm.model, pose_of(x) @ self._arm.tcp.inverse()))
-
-    def get_forward_kin(self, q: Any = None, tcp: Any = None) -> PoseValue:
-        """Return the tool pose at joint positions, by default at the present ones with the present tool."""
-        tool = self._arm.tcp if tcp is None else pose_of(tcp)
-        return values_of(forward(self._arm.model, self._arm.q if q is None else q) @ tool)
-
-    def get_actual_joint_positions_history(self, steps: int = 0) -> Array:
-        """Return the joint positions of some cycles ago [rad]."""
-        history = self._host.history
-        return Array(history[max(0, len(history) - 1 - int(steps))] if history else self._arm.measured.q)
-
     def get_target_waypoint(self) -> PoseValue:
         """Return the tool pose at which the present motion ends; the present pose if nothing moves the arm."""
         motion = self._arm.motion
@@ -160,11 +146,6 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
     def set_tcp(self, pose: Any, *_: Any) -> None:
         """Set the tool centre point in the flange frame."""
         self._arm.tcp = pose_of(numbers(pose, 6, "a tool centre point"))
-
-    def get_joint_temp(self, j: int) -> float:
-        """Return the temperature of a joint [degrees Celsius]: a constant."""
-        index_of(j, 6)
-        return 30.0
 
     # forces, in a world where nothing touches the arm: what would move it even so is told, and it holds
 
@@ -264,6 +245,15 @@ _READINGS: dict[str, Callable[..., Any]] = {
     "get_actual_tool_flange_pose": lambda host: values_of(forward(host.arm.model, host.arm.measured.q)),
     "get_actual_tcp_speed": lambda host: Array(host.arm.measured_twist()),
     "is_steady": lambda host: not host.arm.turning,
+    "get_actual_joint_positions_history": lambda host, steps=0: Array(
+        host.history[max(0, len(host.history) - 1 - int(steps))]
+    ),
+    "get_forward_kin": lambda host, q=None, tcp=None: values_of(
+        forward(host.arm.model, host.arm.q if q is None else q) @ (host.arm.tcp if tcp is None else pose_of(tcp))
+    ),
+    "get_inverse_kin_has_solution": lambda host, x, *_: bool(
+        solutions(host.arm.model, pose_of(x) @ host.arm.tcp.inverse())
+    ),
     # commanded; no path has an offset
     "get_target_joint_positions": lambda host: Array(host.arm.q),
     "get_target_joint_speeds": lambda host: Array(host.arm.qd),
@@ -284,6 +274,7 @@ _READINGS: dict[str, Callable[..., Any]] = {
     "force": lambda host: math.hypot(*host.inputs.wrench()[:3]),
     # constants of sensors that are not simulated
     **dict.fromkeys(("get_controller_temp", "get_tool_temp"), lambda _: 30.0),
+    "get_joint_temp": lambda _, j: ((30.0,) * 6)[index_of(j, 6)],
     "get_tool_current": lambda _: 0.0,
     "get_tool_accelerometer_reading": lambda _: Array((0.0, 0.0, -9.81)),
     "get_joint_torques": lambda _: Array(_NOT_SIMULATED),

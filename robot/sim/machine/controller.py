@@ -19,17 +19,7 @@ from coneskin.robot.ur.rtde_codec import RobotMode, SafetyMode, Value
 from .inputs_outputs import InputWatchdog, digital_outputs
 from .program import Program
 from .script_host import ScriptHost
-from .states import (
-    FAULT_REPORT,
-    MOVING,
-    WARNING_REPORT,
-    ErrorNotice,
-    Options,
-    ProgramFailed,
-    ProgramNotice,
-    Runtime,
-    SafetyNotice,
-)
+from .states import FAULT_REPORT, MOVING, ErrorNotice, Options, ProgramFailed, ProgramNotice, Runtime, SafetyNotice
 
 #: commands that change the power of the arm
 POWER_COMMANDS = ("power on", "power off", "brake release", "restart safety")
@@ -106,7 +96,7 @@ class Controller(ScriptHost):
             self.plant.close()
             self.log("plant_lost", reason=self.plant_lost)
             self._enter(SafetyMode.FAULT)
-            self.tell(ErrorNotice(_PLANT_LOST, 0, FAULT_REPORT, self.plant_lost))
+            self.tell(ErrorNotice(_PLANT_LOST, 0, self.plant_lost, FAULT_REPORT))
             self.robot_mode = RobotMode.POWER_OFF
             self.stop_program("the plant is lost")
 
@@ -225,7 +215,7 @@ class Controller(ScriptHost):
         self._enter(SafetyMode.PROTECTIVE_STOP)
         self._stopped_at = self.timestamp
         self.log("protective_stop", reason=reason, cause=str(cause))
-        self.tell(ErrorNotice(cause.code, cause.argument, WARNING_REPORT, reason))
+        self.tell(ErrorNotice(cause.code, cause.argument, reason))
         if self.options.after_protective_stop == "stop":
             self.stop_program("protective stop")
         else:

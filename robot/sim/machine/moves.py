@@ -17,7 +17,7 @@ from coneskin.robot.sim.motion.path import JointLine, Path, ToolArc, ToolLine
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, number, numbers, pose_of, show
 
 from .script_host import CallingProgram, ScriptHost
-from .states import WARNING_REPORT, ErrorNotice
+from .states import ErrorNotice
 
 _NOT_SIMULATED = 0  # number of a log entry that only this simulator writes
 
@@ -37,7 +37,7 @@ class MoveFunctions:
         if what not in self._program.told:
             self._program.told.add(what)
             self._host.log("not_simulated", what=what)
-            self._host.tell(ErrorNotice(_NOT_SIMULATED, 0, WARNING_REPORT, f"not simulated: {what}"))
+            self._host.tell(ErrorNotice(_NOT_SIMULATED, 0, f"not simulated: {what}"))
 
     def _move(self, make: Callable[[], Motion], radius: float = 0.0, **what: Any) -> Wait:
         """Let a motion drive the arm until it is done, or as close to its goal as the blend radius [m]."""

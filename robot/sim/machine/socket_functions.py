@@ -143,17 +143,13 @@ class SocketFunctions:
         self, number: Any, socket_name: Any = _SOCKET_NAME, timeout: Any = 2
     ) -> Generator[None, None, Array]:
         """Read whole numbers of four bytes; return their number, and them; 0 and -1 after the timeout."""
-        count = _count(number)
-        data = yield from self._read(4 * count, socket_name, timeout)
-        return Array([count, *struct.unpack(f">{count}i", data)] if data else [0, *[-1] * count])
+        return (yield from self._read_values(number, "i", socket_name, timeout))
 
     def socket_read_byte_list(
         self, number: Any, socket_name: Any = _SOCKET_NAME, timeout: Any = 2
     ) -> Generator[None, None, Array]:
         """Read bytes; return their number, and them; 0 and -1 after the timeout."""
-        count = _count(number)
-        data = yield from self._read(count, socket_name, timeout)
-        return Array([count, *data] if data else [0, *[-1] * count])
+        return (yield from self._read_values(number, "B", socket_name, timeout))
 
     def socket_read_line(self, socket_name: Any = _SOCKET_NAME, timeout: Any = 2) -> Generator[None, None, str]:
         """Read a line, without its end; an empty text after the timeout."""
@@ -185,13 +181,16 @@ class SocketFunctions:
         text = yield from self._wait(socket_name, timeout, take)
         return text.decode("utf-8", "replace")
 
-    def _read(self, count: int, name: Any, timeout: Any) -> Generator[None, None, bytes]:
-        """Read so many bytes, none of them after the timeout."""
+    def _read_values(self, number: Any, code: str, name: Any, timeout: Any) -> Generator[None, None, Array]:
+        """Read so many values that the struct module has a code for."""
+        count = _count(number)
+        layout = struct.Struct(f">{count}{code}")
 
         def take(connection: ScriptSocket) -> bytes | None:
-            return connection.pop(count) if len(connection.unread) >= count else None
+            return connection.pop(layout.size) if len(connection.unread) >= layout.size else None
 
-        return (yield from self._wait(name, timeout, take))
+        data = yield from self._wait(name, timeout, take)
+        return Array([count, *layout.unpack(data)] if data else [0, *[-1] * count])
 
     def _wait(
         self, name: Any, timeout: Any, take: Callable[[ScriptSocket], bytes | None]

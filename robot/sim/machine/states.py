@@ -36,16 +36,13 @@ class Runtime(IntEnum):
         return "PLAYING" if self is Runtime.PLAYING else "PAUSED" if self.paused else "STOPPED"
 
 
-#: state -> word of RTDE's safety_status_bits
+#: state that occurs here -> word of RTDE's safety_status_bits
 SAFETY_BITS = {
     SafetyMode.NORMAL: 1 << 0,
     SafetyMode.REDUCED: 1 << 1,
     SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
-    SafetyMode.RECOVERY: 1 << 3,
     SafetyMode.SAFEGUARD_STOP: 1 << 4 | 1 << 10,
-    SafetyMode.SYSTEM_EMERGENCY_STOP: 1 << 5 | 1 << 7 | 1 << 10,
     SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
-    SafetyMode.VIOLATION: 1 << 8 | 1 << 10,
     SafetyMode.FAULT: 1 << 9 | 1 << 10,
 }
 
@@ -163,8 +160,8 @@ class ErrorNotice:
 
     code: int
     argument: int
-    report: int
-    text: str = ""
+    text: str
+    report: int = WARNING_REPORT
 
 
 Notice = TextNotice | PopupNotice | ProgramNotice | ProgramFailed | SafetyNotice | ErrorNotice

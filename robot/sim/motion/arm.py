@@ -176,6 +176,10 @@ class SimulatedArm:
         self.q, self.qd = q, qd
         return fault
 
+    def going(self, qd: list[float]) -> tuple[list[float], list[float]]:
+        """Return positions and speeds one cycle later, the speeds changing evenly to these."""
+        return [a + 0.5 * (b + c) * CYCLE for a, b, c in zip(self.q, self.qd, qd, strict=True)], qd
+
     def brake(self, rate: float = 0.0) -> tuple[list[float], list[float]]:
         """Return positions and speeds after a cycle of braking, all joints in proportion; see `braking`."""
         lead = max_abs(self.qd)
@@ -183,7 +187,7 @@ class SimulatedArm:
             return list(self.q), [0.0] * 6
         share = max(0.0, 1.0 - self.braking(rate) * CYCLE / lead)
         slower = [speed * share for speed in self.qd]
-        return integrate(self.q, self.qd, slower), slower
+        return self.going(slower)
 
     def braking(self, rate: float = 0.0) -> float:
         """Return the deceleration of the leading joint in this cycle [rad/s^2].
@@ -301,8 +305,3 @@ class SimulatedArm:
 def max_abs(values: Sequence[float]) -> float:
     """Return the greatest magnitude: that of the leading joint."""
     return max(abs(value) for value in values)
-
-
-def integrate(q: Sequence[float], before: Sequence[float], after: Sequence[float]) -> list[float]:
-    """Return joint positions one cycle later, the speed changing evenly [rad]."""
-    return [a + 0.5 * (b + c) * CYCLE for a, b, c in zip(q, before, after, strict=True)]

@@ -17,7 +17,6 @@ from .arm import (
     SUDDEN_CHANGE,
     MotionFault,
     SimulatedArm,
-    integrate,
     max_abs,
 )
 
@@ -57,7 +56,7 @@ class SpeedJoints(_Sustained):
             qd = [scale * a for a in self.target]
         else:
             qd = [speed + change * step / lead for speed, change in zip(arm.qd, delta, strict=True)]
-        return integrate(arm.q, arm.qd, qd), qd
+        return arm.going(qd)
 
 
 class SpeedTool(_Sustained):
@@ -88,7 +87,7 @@ class SpeedTool(_Sustained):
         self.reached = share == 1.0
         self.twist = [a + b * share for a, b in zip(self.twist, delta, strict=True)]
         qd = arm.joint_speeds(self.twist) if any(self.twist) else [0.0] * 6
-        return integrate(arm.q, arm.qd, qd), qd
+        return arm.going(qd)
 
 
 class ServoJoints(_Sustained):
@@ -128,7 +127,7 @@ class ServoJoints(_Sustained):
             change = max(-largest, min(largest, self.gain * (error - self.lookahead * speed) * CYCLE))
             still = abs(error) < 1e-9 and abs(speed) < 1e-9
             qd.append(0.0 if still else max(-limit, min(limit, speed + change)))
-        return integrate(arm.q, arm.qd, qd), qd
+        return arm.going(qd)
 
     def _check_jump(self, q: Sequence[float]) -> None:
         before, self._followed = self._followed or q, self.target

@@ -17,15 +17,8 @@ from coneskin.robot.arm.inverse_kinematics import nearest
 from coneskin.robot.arm.vectors import cross, dot, minus, scaled
 from coneskin.robot.sim.urscript.values import interpolate
 
-from .arm import (
-    CONTROLLER_DECELERATION,
-    CYCLE,
-    INVALID_SETPOINT,
-    JOINT_ACCELERATION,
-    MotionFault,
-    SimulatedArm,
-    max_abs,
-)
+from .arm import CONTROLLER_DECELERATION, INVALID_SETPOINT, JOINT_ACCELERATION, MotionFault, SimulatedArm, max_abs
+from .plant import CYCLE
 
 
 class _Profile:

@@ -21,19 +21,8 @@ import zlib
 from collections.abc import Callable, Iterable
 
 from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.sim.machine import states
 from coneskin.robot.sim.machine.controller import Controller
-from coneskin.robot.sim.machine.states import (
-    MOVING,
-    WARNING_REPORT,
-    ErrorNotice,
-    Notice,
-    PopupNotice,
-    ProgramFailed,
-    ProgramNotice,
-    SafetyNotice,
-    TextNotice,
-    Version,
-)
 from coneskin.robot.sim.motion.arm import JOINT_ACCELERATION
 from coneskin.robot.sim.motion.path import Path
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH, complete_programs
@@ -62,7 +51,7 @@ def _bytes(text: str) -> bytes:
     return text.encode("utf-8", "replace")
 
 
-def _encode_version(time: float, version: Version) -> bytes:
+def _encode_version(time: float, version: states.Version) -> bytes:
     """Return the message that a client of the primary interface gets first, at a time since power-on [s]."""
     major, minor = version
     name, date = b"URControl", b"01-01-2026, 00:00:00"
@@ -70,23 +59,23 @@ def _encode_version(time: float, version: Version) -> bytes:
     return _message(time, _INTERFACE, _VERSION_MESSAGE, body)
 
 
-def _encode_notice(time: float, notice: Notice) -> bytes:
+def _encode_notice(time: float, notice: states.Notice) -> bytes:
     """Return a notice as a message, at a time since power-on [s]."""
     match notice:
-        case TextNotice(text):
+        case states.TextNotice(text):
             return _message(time, _RUNTIME, _TEXT_MESSAGE, _bytes(text))
-        case PopupNotice(title, text, warning, error):
+        case states.PopupNotice(title, text, warning, error):
             head = _bytes(title)[:_MAX_TITLE_LENGTH]
             flags = struct.pack(">IBBBBB", 0, 0, warning, error, False, len(head))
             return _message(time, _RUNTIME, _POPUP_MESSAGE, flags + head + _bytes(text))
-        case ProgramNotice(name, event):
+        case states.ProgramNotice(name, event):
             key = f"PROGRAM_XXX_{event}".encode()
             return _message(time, _RUNTIME, _KEY_MESSAGE, struct.pack(">iiB", 0, 0, len(key)) + key + _bytes(name))
-        case ProgramFailed(text, line, column):
+        case states.ProgramFailed(text, line, column):
             return _message(time, _RUNTIME, _FAILED_MESSAGE, struct.pack(">ii", line, column) + _bytes(text))
-        case SafetyNotice(mode):
+        case states.SafetyNotice(mode):
             return _message(time, _RUNTIME, _SAFETY_MESSAGE, struct.pack(">iiBiI", 0, 0, mode, _NO_DATA, 0))
-        case ErrorNotice(code, argument, report, text):
+        case states.ErrorNotice(code, argument, text, report):
             body = struct.pack(">iiiII", code, argument, report, _NO_DATA, 0)
             return _message(time, _RUNTIME, _ERROR_MESSAGE, body + _bytes(text))
 
@@ -97,7 +86,7 @@ _PACKET_SIZES = (((5, 10), (3, 15), 1220), ((5, 9), (3, 14), 1140), ((5, 4), (3,
 _MIN_PACKET_SIZE = 1108  # bytes; of older ones, whose packets end with the speed of the elbow
 
 
-def _realtime_size(version: Version) -> int:
+def _realtime_size(version: states.Version) -> int:
     """Return the length of a packet of that version [bytes]."""
     return next(
         (size for e, cb3, size in _PACKET_SIZES if version >= (cb3 if version[0] == 3 else e)), _MIN_PACKET_SIZE
@@ -152,9 +141,9 @@ def _changing(c: Controller) -> Iterable[bytes]:
     arm = c.arm
     running, paused = c.runtime.word != "STOPPED", c.runtime.paused
     powered = c.robot_mode is not RobotMode.POWER_OFF
-    stopped = c.safety in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP)
+    stopped = c.safety is SafetyMode.ROBOT_EMERGENCY_STOP
     flags = (True, True, powered, stopped, c.safety is SafetyMode.PROTECTIVE_STOP, running and not paused, paused)
-    scaling = c.speed_scaling if c.safety in MOVING else 0.0
+    scaling = c.speed_scaling if c.safety in states.MOVING else 0.0
     time = round(c.timestamp * 1e6)
     mode = struct.pack(">Q7BBBddd", time, *flags, c.robot_mode, _CONTROL_MODE_POSITION, c.slider, scaling, 1.0)
     last = b"" if c.options.version[0] == 3 else bytes(1)  # a byte that CB3 does not have, here and below
@@ -220,17 +209,17 @@ def due_packets(controller: Controller, listening: frozenset[str]) -> dict[str, 
         listening: ports that have clients; for the others nothing is made.
     """
     c = controller
-    states: dict[str, bytes] = {}
+    packets: dict[str, bytes] = {}
     notices = [c.notices.popleft() for _ in range(len(c.notices))]
-    changed = any(isinstance(notice, SafetyNotice) for notice in notices)  # whose state comes no later
+    changed = any(isinstance(notice, states.SafetyNotice) for notice in notices)  # whose state comes no later
     if (changed or c.cycle % _STATE_CYCLES == 0) and (ports := listening & {"primary", "secondary"}):
-        states = dict.fromkeys(ports, _encode_state(c))
+        packets = dict.fromkeys(ports, _encode_state(c))
     if "realtime" in listening and c.cycle % c.options.steps == 0:
-        states["realtime"] = _encode_realtime(c)
-    due = {name: (state, b"") for name, state in states.items()}
+        packets["realtime"] = _encode_realtime(c)
+    due = {name: (state, b"") for name, state in packets.items()}
     if "primary" in listening and notices:
         messages = b"".join([_encode_notice(c.timestamp, notice) for notice in notices])
-        due["primary"] = (states.get("primary", b""), messages)
+        due["primary"] = (packets.get("primary", b""), messages)
     return due
 
 
@@ -272,14 +261,14 @@ class ScriptPort:
         """
         if self._opened_local or not self._controller.remote_control:
             self._controller.log("dropped", reason="local control")
-            notice = ErrorNotice(_READ_ONLY, 0, WARNING_REPORT, "The connection is read-only")
+            notice = states.ErrorNotice(_READ_ONLY, 0, "The connection is read-only")
             return _encode_notice(self._controller.timestamp, notice) if self._messages else b""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))
         if len(self._rest) > MAX_LENGTH:
             self._rest, self.left = "", True
             problem = f"a program has at most {MAX_LENGTH} characters"
             self._controller.log("dropped", reason=problem)
-            return _encode_notice(self._controller.timestamp, ProgramFailed(problem)) if self._messages else b""
+            return _encode_notice(self._controller.timestamp, states.ProgramFailed(problem)) if self._messages else b""
         last = True  # of two that move the arm in one batch the first would never start
         kept = []
         for text in reversed(programs):
@@ -309,14 +298,14 @@ def interpreter_reply(controller: Controller, line: str) -> str:
     if program is None:
         return f"discard: no program is running: {statement}"
     interpreter = program.interpreter
-    states = {
+    answers = {
         "statelastexecuted": interpreter.executed,
         "statelastinterpreted": interpreter.interpreted,
         "statelastcleared": interpreter.cleared,
         "stateunexecuted": interpreter.unexecuted,
     }
-    if statement in states:
-        return f"state: {states[statement]}: {statement}"
+    if statement in answers:
+        return f"state: {answers[statement]}: {statement}"
     if statement == "skipbuffer":
         interpreter.skip()
     elif statement == "abort":

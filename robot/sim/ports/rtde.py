@@ -22,26 +22,14 @@ from coneskin.robot.sim.machine.inputs_outputs import INPUTS
 from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, Runtime, Version, has_since
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
-from coneskin.robot.ur.rtde_codec import (
-    IN_USE,
-    NOT_FOUND,
-    VARIABLES,
-    Packet,
-    PacketKind,
-    Recipe,
-    RobotMode,
-    Value,
-    pack,
-    split,
-    split_names,
-)
+from coneskin.robot.ur import rtde_codec as wire
 
 _ELBOW_FRAME = 2  # number of the frame at the elbow
 _JOINT_OFF = 239
-_JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}  # of joints, and of the tool
+_JOINT_MODES = {wire.RobotMode.RUNNING: 253, wire.RobotMode.IDLE: 255}  # of joints, and of the tool
 _SIX_ZEROS = (0.0,) * 6  # six zeros, for any vector of that length
 #: output -> constant value of a sensor that is not simulated, in the unit of RTDE
-_CONSTANT_OUTPUTS: dict[str, Value] = {
+_CONSTANT_OUTPUTS: dict[str, wire.Value] = {
     "joint_temperatures": (30.0,) * 6,
     "actual_main_voltage": 48.0,
     "actual_robot_voltage": 48.0,
@@ -68,7 +56,7 @@ _FIRST_VERSIONS: dict[str, tuple[int, int | None]] = {
 
 def available(name: str, version: Version) -> bool:
     """Return whether a controller of that version has this output. The input registers are outputs too."""
-    if name not in VARIABLES or (name in INPUTS and not name.startswith("input_")):
+    if name not in wire.VARIABLES or (name in INPUTS and not name.startswith("input_")):
         return False
     return has_since(version, *_FIRST_VERSIONS.get(name, (0, 0)))
 
@@ -79,11 +67,11 @@ class RtdeOutputs:
     def __init__(self, controller: Controller) -> None:
         self._c = c = controller
         self._pose_at: tuple[object, object] = (None, None)
-        self._pose: Value = _SIX_ZEROS
+        self._pose: wire.Value = _SIX_ZEROS
         self._twist_at = -1
-        self._twist: Value = _SIX_ZEROS
+        self._twist: wire.Value = _SIX_ZEROS
         arm, c.rtde_value = c.arm, self.value
-        self._getters: dict[str, Callable[[], Value | Sequence[float]]] = {
+        self._getters: dict[str, Callable[[], wire.Value | Sequence[float]]] = {
             "timestamp": lambda: c.timestamp,
             "control_step": lambda: c.cycle,
             "actual_q": lambda: arm.measured.q,
@@ -93,15 +81,19 @@ class RtdeOutputs:
             "target_qdd": lambda: arm.qdd,
             "actual_current": lambda: c.currents,
             "actual_TCP_pose": self._tcp_pose,
-            "target_TCP_pose": self._target_tcp_pose,
+            "target_TCP_pose": lambda: (
+                self._tcp_pose() if arm.measured.q is arm.q else tuple(values_of(arm.tcp_pose()))
+            ),
             "actual_TCP_speed": self._tcp_speed,
-            "target_TCP_speed": self._target_tcp_speed,
+            "target_TCP_speed": lambda: self._tcp_speed() if arm.measured.qd is arm.qd else tuple(arm.twist()),
             "tcp_offset": lambda: tuple(values_of(arm.tcp)),
             "runtime_state": lambda: int(c.runtime),
             "robot_mode": lambda: int(c.robot_mode),
             "safety_mode": lambda: int(c.safety),
             "safety_status": lambda: int(c.safety),
-            "robot_status_bits": lambda: _robot_bits(c.robot_mode, c.runtime is Runtime.PLAYING),
+            "robot_status_bits": lambda: (  # 0 power on, 1 program running
+                int(c.robot_mode is not wire.RobotMode.POWER_OFF) | int(c.runtime is Runtime.PLAYING) << 1
+            ),
             "safety_status_bits": lambda: SAFETY_BITS[c.safety],
             "speed_scaling": lambda: c.speed_scaling if c.safety in MOVING else 0.0,
             "target_speed_fraction": lambda: c.slider,
@@ -132,7 +124,7 @@ class RtdeOutputs:
             "payload_inertia": lambda: c.payload_inertia,
         }
 
-    def getter(self, name: str) -> Callable[[], Value | Sequence[float]]:
+    def getter(self, name: str) -> Callable[[], wire.Value | Sequence[float]]:
         """Return a function that returns the present value of an output."""
         c = self._c
         if name in self._getters:
@@ -149,8 +141,8 @@ class RtdeOutputs:
             return lambda: values[index]
         if name in c.inputs.values and name.startswith("input_"):
             return lambda: c.inputs.values[name]
-        kind = VARIABLES[name]
-        zero: Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
+        kind = wire.VARIABLES[name]
+        zero: wire.Value = (0.0,) * int(kind[6]) if kind.startswith("VECTOR") else 0
         constant = _CONSTANT_OUTPUTS.get(name, zero)
         return lambda: constant
 
@@ -165,7 +157,7 @@ class RtdeOutputs:
         value = self.getter(name)()
         return Array(value) if isinstance(value, Sequence) else value
 
-    def _tcp_pose(self) -> Value:
+    def _tcp_pose(self) -> wire.Value:
         arm = self._c.arm
         q = arm.measured.q
         if self._pose_at[0] is not q or self._pose_at[1] is not arm.tcp:  # a moving arm makes a new list
@@ -173,24 +165,11 @@ class RtdeOutputs:
             self._pose_at = (q, arm.tcp)
         return self._pose
 
-    def _tcp_speed(self) -> Value:
+    def _tcp_speed(self) -> wire.Value:
         if self._twist_at != self._c.cycle:
             self._twist = tuple(self._c.arm.measured_twist())
             self._twist_at = self._c.cycle
         return self._twist
-
-    def _target_tcp_pose(self) -> Value:
-        arm = self._c.arm
-        return self._tcp_pose() if arm.measured.q is arm.q else tuple(values_of(arm.tcp_pose()))
-
-    def _target_tcp_speed(self) -> Value:
-        arm = self._c.arm
-        return self._tcp_speed() if arm.measured.qd is arm.qd else tuple(arm.twist())
-
-
-def _robot_bits(mode: RobotMode, program: bool) -> int:
-    """Return RTDE's robot_status_bits: 0 power on, 1 program running, 2 teach button, 3 power button."""
-    return int(mode is not RobotMode.POWER_OFF) | int(program) << 1
 
 
 def elbow_velocity(arm: SimulatedArm) -> Vector:
@@ -218,15 +197,15 @@ class RtdeSession:
         self._c = controller
         self._outputs = outputs
         self._rest = b""
-        self._inputs: list[Recipe] = []
-        self._recipe: Recipe | None = None
+        self._inputs: list[wire.Recipe] = []
+        self._recipe: wire.Recipe | None = None
         self._getters: list[tuple[Callable[[], object], bool]] = []
         self._every = 1
         self.started = False
 
     def receive(self, data: bytes) -> bytes:
         """Act on bytes of the client, and return the replies."""
-        packets, self._rest = split(self._rest + data)
+        packets, self._rest = wire.split(self._rest + data)
         return b"".join([self._answer(packet) for packet in packets])
 
     def outputs(self) -> bytes:
@@ -239,7 +218,7 @@ class RtdeSession:
                 flat.extend(get())  # type: ignore[arg-type]
             else:
                 flat.append(get())  # type: ignore[arg-type]
-        return pack(PacketKind.DATA, self._recipe.pack_flat(flat))
+        return wire.pack(wire.PacketKind.DATA, self._recipe.pack_flat(flat))
 
     def close(self) -> None:
         """Release the inputs that the client owned; they keep their values."""
@@ -247,25 +226,25 @@ class RtdeSession:
         for name in [name for name, owner in owners.items() if owner is self]:
             del owners[name]
 
-    def _answer(self, packet: Packet) -> bytes:
+    def _answer(self, packet: wire.Packet) -> bytes:
         kind, payload = packet
-        if kind is PacketKind.DATA:
+        if kind is wire.PacketKind.DATA:
             self._data(payload)
             return b""
-        if kind is PacketKind.PROTOCOL_VERSION:
-            return pack(kind, bytes([payload == b"\x00\x02"]))
-        if kind is PacketKind.CONTROLLER_VERSION:
-            return pack(kind, struct.pack(">4I", *self._c.options.version, BUGFIX_VERSION, BUILD_NUMBER))
-        if kind is PacketKind.OUTPUTS:
-            return pack(kind, self._set_outputs(payload))
-        if kind is PacketKind.INPUTS:
-            return pack(kind, self._set_inputs(payload))
-        if kind is PacketKind.START:
+        if kind is wire.PacketKind.PROTOCOL_VERSION:
+            return wire.pack(kind, bytes([payload == b"\x00\x02"]))
+        if kind is wire.PacketKind.CONTROLLER_VERSION:
+            return wire.pack(kind, struct.pack(">4I", *self._c.options.version, BUGFIX_VERSION, BUILD_NUMBER))
+        if kind is wire.PacketKind.OUTPUTS:
+            return wire.pack(kind, self._set_outputs(payload))
+        if kind is wire.PacketKind.INPUTS:
+            return wire.pack(kind, self._set_inputs(payload))
+        if kind is wire.PacketKind.START:
             self.started = self._recipe is not None
-            return pack(kind, bytes([self.started]))
-        if kind is PacketKind.PAUSE:
+            return wire.pack(kind, bytes([self.started]))
+        if kind is wire.PacketKind.PAUSE:
             self.started = False
-            return pack(kind, b"\x01")
+            return wire.pack(kind, b"\x01")
         self._c.log("client_text", text=payload.decode("latin-1"))
         return b""
 
@@ -273,12 +252,12 @@ class RtdeSession:
         if len(payload) < 8:
             return b"\x00"
         frequency = struct.unpack_from(">d", payload)[0]
-        names = split_names(payload[8:])
+        names = wire.split_names(payload[8:])
         version = self._c.options.version
-        types = [VARIABLES[name] if available(name, version) else NOT_FOUND for name in names]
+        types = [wire.VARIABLES[name] if available(name, version) else wire.NOT_FOUND for name in names]
         self.started, self._recipe = False, None
-        if names and NOT_FOUND not in types and len(names) <= _MAX_NAMES:
-            self._recipe = Recipe(names)
+        if names and wire.NOT_FOUND not in types and len(names) <= _MAX_NAMES:
+            self._recipe = wire.Recipe(names)
             self._getters = [
                 (self._outputs.getter(name), kind.startswith("VECTOR")) for name, kind in zip(names, types, strict=True)
             ]
@@ -288,18 +267,18 @@ class RtdeSession:
         return bytes([self._recipe is not None]) + _list(types)
 
     def _set_inputs(self, payload: bytes) -> bytes:
-        names, owners = split_names(payload), self._c.inputs.owners
+        names, owners = wire.split_names(payload), self._c.inputs.owners
         types = []
         for name in names:
             if name not in self._c.inputs.values:
-                types.append(NOT_FOUND)
+                types.append(wire.NOT_FOUND)
             else:
-                types.append(VARIABLES[name] if owners.get(name, self) is self else IN_USE)
+                types.append(wire.VARIABLES[name] if owners.get(name, self) is self else wire.IN_USE)
         full = len(names) > _MAX_NAMES or len(self._inputs) == _MAX_RECIPES
-        if not names or full or NOT_FOUND in types or IN_USE in types:
+        if not names or full or wire.NOT_FOUND in types or wire.IN_USE in types:
             return b"\x00" + _list(types)
         owners.update(dict.fromkeys(names, self))
-        self._inputs.append(Recipe(names, ident=len(self._inputs) + 1))
+        self._inputs.append(wire.Recipe(names, ident=len(self._inputs) + 1))
         return bytes([len(self._inputs)]) + _list(types)
 
     def _data(self, payload: bytes) -> None:

@@ -25,7 +25,6 @@ from coneskin.robot.ur.rtde_codec import (
     pack,
     pack_inputs_request,
     pack_outputs_request,
-    pack_start_request,
 )
 
 _POSE = "p[0.4, 0.1, 0.5, 0, 3, 0]"
@@ -127,7 +126,7 @@ class Watched:
         self.controller = Controller(Options(start_delay=0.0, unlock_after=0.0))
         self._session = RtdeSession(self.controller, RtdeOutputs(self.controller))
         names = [name for name in VARIABLES if not name.startswith(("input_", "external_", "speed_slider_mask"))]
-        self._session.receive(pack_outputs_request(names) + pack_start_request())
+        self._session.receive(pack_outputs_request(names) + pack(PacketKind.START))
 
     def run(self, text: str, cycles: int = 30) -> str:
         """Run what arrives on a script port; return why it could not, or an empty string."""
@@ -215,7 +214,7 @@ def _requests() -> dict[str, tuple[str, bytes]]:
     return {
         "a frequency of almost nothing": ("RTDE", pack_outputs_request(["timestamp"], 5e-324)),
         "a frequency that is none": ("RTDE", pack(PacketKind.OUTPUTS, nan + b"timestamp")),
-        "outputs without end": ("RTDE", pack_outputs_request(["actual_q"] * 7000) + pack_start_request()),
+        "outputs without end": ("RTDE", pack_outputs_request(["actual_q"] * 7000) + pack(PacketKind.START)),
         "recipes without end": ("RTDE", pack_inputs_request(["input_int_register_0"]) * 400),
         "data of no recipe": ("RTDE", pack(PacketKind.DATA, b"\x07") + pack(PacketKind.DATA)),
         "short packets": ("RTDE", pack(PacketKind.OUTPUTS) + pack(PacketKind.INPUTS) + pack(PacketKind.TEXT, b"\xff")),

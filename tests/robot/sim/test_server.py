@@ -11,7 +11,7 @@ from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.sim.server import PORTS, Server
-from coneskin.robot.ur.rtde_codec import Packet, PacketKind, Recipe, pack_outputs_request, pack_start_request, split
+from coneskin.robot.ur.rtde_codec import Packet, PacketKind, Recipe, pack, pack_outputs_request, split
 
 NAMES = ("timestamp", *(f"output_double_register_{i}" for i in range(48)))
 
@@ -43,7 +43,7 @@ def test_a_client_that_does_not_read_gets_whole_packets_and_the_newest_later() -
     with Server(controller, free_host()) as server, socket.socket() as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         deaf.connect((server.host, PORTS["RTDE"]))
-        deaf.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        deaf.sendall(pack_outputs_request(NAMES) + pack(PacketKind.START))
         server._poll(1.0)
         (client,) = server._clients["RTDE"]
         client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
@@ -63,7 +63,7 @@ def test_a_client_that_reads_nothing_for_ten_seconds_is_dropped() -> None:
     with Server(controller, free_host()) as server, socket.socket() as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         deaf.connect((server.host, PORTS["RTDE"]))
-        deaf.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        deaf.sendall(pack_outputs_request(NAMES) + pack(PacketKind.START))
         server._poll(1.0)
         (client,) = server._clients["RTDE"]
         client.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
@@ -109,7 +109,7 @@ def test_a_cut_network_drops_packets_both_ways_and_closes_nothing() -> None:
     with Server(controller, free_host()) as server:
         script = socket.create_connection((server.host, PORTS["realtime"]))
         rtde = socket.create_connection((server.host, PORTS["RTDE"]))
-        rtde.sendall(pack_outputs_request(NAMES) + pack_start_request())
+        rtde.sendall(pack_outputs_request(NAMES) + pack(PacketKind.START))
         turn(server, 5)
         assert read_all(rtde, server, 20)
         assert server.faults.answer("cut network") == '{"result": true}'

@@ -29,7 +29,6 @@ from coneskin.robot.ur.rtde_codec import (
     pack,
     pack_inputs_request,
     pack_outputs_request,
-    pack_start_request,
     split,
 )
 from tests.support.malformed_packets import SERVICES, malformed_packet
@@ -43,7 +42,7 @@ class Reader:
 
     def __init__(self, server: Server, names: tuple[str, ...] = NAMES) -> None:
         self.socket = socket.create_connection((server.host, PORTS["RTDE"]), 5.0)
-        self.socket.sendall(pack_outputs_request(names) + pack_start_request())
+        self.socket.sendall(pack_outputs_request(names) + pack(PacketKind.START))
         self.socket.setblocking(False)
         self.count, self._rest = 0, b""
 
@@ -207,7 +206,7 @@ def test_one_that_is_seldom_sent_something_has_ten_seconds_to_read_it(
     for module in (server_module, client_module):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     with connect(server, "RTDE") as seldom:
-        seldom.sendall(pack_outputs_request(NAMES, 5.0) + pack_start_request())
+        seldom.sendall(pack_outputs_request(NAMES, 5.0) + pack(PacketKind.START))
         turn(server, 150)
         (client,) = server._clients["RTDE"]
         assert client.stuck_since == 1000.0
@@ -239,7 +238,7 @@ def test_one_that_acknowledges_nothing_any_more_gives_its_inputs_back(
         gone.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
         gone.connect((server.host, PORTS["RTDE"]))
         gone.sendall(pack_inputs_request(("input_int_register_0",)))
-        gone.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack_start_request())
+        gone.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack(PacketKind.START))
         turn(server, 5)
         assert server.controller.inputs.owners
         monkeypatch.setattr(server_module, "UNREAD_TIMEOUT", math.inf)  # for the server's own check of unread bytes
@@ -292,7 +291,7 @@ def test_ten_clients_of_rtde_are_all_served_in_each_cycle_beside_one_that_does_n
     with socket.socket() as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, SLOW_READER)
         deaf.connect((server.host, PORTS["RTDE"]))
-        deaf.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack_start_request())
+        deaf.sendall(pack_outputs_request([f"output_double_register_{i}" for i in range(48)]) + pack(PacketKind.START))
         readers = [Reader(server) for _ in range(10)]
         others = [connect(server, name) for name in SERVICES if name != "RTDE" for _ in range(10)]
         turn(server, 80)

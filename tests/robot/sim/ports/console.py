@@ -9,8 +9,7 @@ from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.dashboard import Dashboard
-from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL
-from coneskin.robot.sim.ports.user_interface import UserInterface
+from coneskin.robot.sim.ports.user_interface import EXTERNAL_CONTROL, UserInterface
 from coneskin.robot.sim.urscript.translator import Translation, translate
 
 WAIT = "def wait():\n  while True:\n    sleep(0.01)\n  end\nend\n"

@@ -60,7 +60,7 @@ def test_the_version_is_laid_out_as_the_recorded_one():
 
 
 def test_an_error_has_its_code_and_its_gravity():
-    made = _encode_notice(1.5, ErrorNotice(153, 2, 3, "text"))
+    made = _encode_notice(1.5, ErrorNotice(153, 2, "text", 3))
     assert struct.unpack(">iBQBBiiiII", made[:35]) == (39, 20, 1_500_000, 253, 6, 153, 2, 3, 0, 0)
     assert made[35:] == b"text"
 
@@ -95,7 +95,7 @@ def test_half_a_pair_of_surrogates_ends_no_controller():
     assert _encode_notice(0.0, TextNotice(f"a{half}b")).endswith(b"a?b")
     for notice in (PopupNotice(half, half), ProgramNotice(half, "STARTED"), ProgramFailed(half, 1, 1)):
         assert _encode_notice(0.0, notice).endswith(b"?")
-    assert _encode_notice(0.0, ErrorNotice(209, 0, 2, half)).endswith(b"?")
+    assert _encode_notice(0.0, ErrorNotice(209, 0, half)).endswith(b"?")
 
 
 #: kind of a sub-package -> its size, in the packet of 1386 bytes recorded from URSim 5.24 with a UR5e

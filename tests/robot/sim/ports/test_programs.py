@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.robot.sim.ports.program_file import EXTERNAL_CONTROL, ProgramFolder
+from coneskin.robot.sim.ports.user_interface import EXTERNAL_CONTROL, ProgramFolder
 from coneskin.robot.sim.urscript.values import ScriptError
 from tests.robot.sim.ports.console import EXTERNAL, WAIT, save_program
 
