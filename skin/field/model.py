@@ -19,16 +19,15 @@ from coneskin.core.errors import FieldError
 
 from .disc import Disc, Discs, check_discs
 from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
-from .multipole import FIRST, LADDER, higher, resolution, solve_discs
+from .multipole import LADDER, higher, resolution, solve_discs
 from .one_scene import SceneSolver, scene_solver
-from .rim import solve_rims
 from .sheet import SectorSheet
 
 #: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
 PAIRS_AT_ONCE = 12000
 
-#: Error that rounding leaves on points of a rim, relative to the supply: no tolerance below asks for more points.
-ROUNDING = 1e-13
+#: Error that rounding leaves, relative to the supply: no tolerance below asks for more multipoles.
+_ROUNDING_ERROR = 1e-13
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +140,7 @@ class FieldModel:
             if order is not None:
                 break
             # Also where the estimate is no number.
-            waiting = waiting[~(out[6, waiting] <= self.tolerance)]
-            for index in waiting[orders[waiting] == FIRST].tolist():
-                out[:, index] = self._solve_rims(discs, index, out[:, index])
-            waiting = waiting[~(out[6, waiting] <= max(self.tolerance, ROUNDING))]
+            waiting = waiting[~(out[6, waiting] <= max(self.tolerance, _ROUNDING_ERROR))]
             for index in waiting[orders[waiting] == LADDER[-1]].tolist():
                 self._refuse(discs, index, out[6, index])
             orders[waiting] = [higher(int(orders[i]), float(out[6, i]), self.tolerance) for i in waiting]
@@ -169,16 +165,8 @@ class FieldModel:
                 else:
                     out[:, index] = math.nan
                 continue
-            out[:, index] = _numbers(got)
+            out[:, index] = [getattr(got, name) for name in ("conductance", "x", "y", "xx", "xy", "yy", "error")]
             out[6, index[~(got.conductance >= 0.0)]] = math.nan
-
-    def _solve_rims(self, discs: Discs, index: int, found: Floats) -> Floats:
-        """Solve one scene that multipoles do not resolve; return what was found by them where this is no better."""
-        one = discs.scenes(np.array([index]))
-        if not _near_apex(self.sheet, one):
-            return found
-        got = solve_rims(self.sheet, self.upper_resistance, self.lower_resistance, one, self.tolerance)
-        return found if found[6] <= got.error[0] else _numbers(got)[:, 0]
 
     def _refuse(self, discs: Discs, index: int, error: float) -> None:
         places = zip(discs.u[index].tolist(), discs.phi[index].tolist(), discs.radius[index].tolist(), strict=True)
@@ -188,18 +176,6 @@ class FieldModel:
             f" {self.tolerance:g}: leave more room to the apex, to the edges and between contacts, or raise the model's"
             " tolerance"
         )
-
-
-def _near_apex(sheet: SectorSheet, discs: Discs) -> bool:
-    """Tell whether a disc of one scene is so near the apex that multipoles die away slower than exp(-m/3)."""
-    stretch = sheet.stretch(discs.u)
-    return bool(
-        (np.log(np.maximum(stretch, 1e-300) / (abs(sheet.curvature) * discs.radius + 1e-300)) < 1.0 / 6.0).any()
-    )
-
-
-def _numbers(coupling: Coupling) -> Floats:
-    return np.array([getattr(coupling, name) for name in ("conductance", "x", "y", "xx", "xy", "yy", "error")])
 
 
 def solve(model: FieldModel, discs: Sequence[Disc], *phases: DrivePhase) -> tuple[Readings, ...]:

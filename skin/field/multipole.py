@@ -27,8 +27,7 @@ LADDER = (1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 64, 80
 
 _MIN_ORDER = 4  # orders, or nothing tells how they die away
 
-#: Order up to which the first choice goes; a scene that needs more may do better on points of its rims.
-FIRST = 128
+_MAX_FIRST = 128  # order up to which the first choice goes
 
 
 def resolution(
@@ -73,7 +72,7 @@ def resolution(
     if order is None:
         wanted = 0.56 * math.log(1.0 / tolerance) / np.maximum(slowest, 1e-3)
         ladder = np.array(LADDER)
-        orders = ladder[np.searchsorted(ladder, np.clip(1.0 + np.ceil(wanted), _MIN_ORDER, FIRST))]
+        orders = ladder[np.searchsorted(ladder, np.clip(1.0 + np.ceil(wanted), _MIN_ORDER, _MAX_FIRST))]
     else:
         orders = np.full(slowest.shape, order)
     return np.asarray(orders, dtype=np.int64)

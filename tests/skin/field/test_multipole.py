@@ -15,6 +15,7 @@ from coneskin.skin.field.disc import Disc
 from coneskin.skin.field.fourport import angular_phase, radial_phase
 from coneskin.skin.field.model import FieldModel, solve
 from coneskin.skin.field.sheet import SectorSheet
+from tests.support.field import rim_solution
 from tests.support.sweep import sweep
 
 from ..field_cases import PAPER, SHEETS, finite_differences, guide_volts
@@ -205,3 +206,40 @@ def test_overlap_order_and_resistance_are_refused() -> None:
             FieldModel(PAPER, bad, 1.0)
     with pytest.raises(FieldError, match="tolerance must be in"):
         FieldModel(PAPER, 1.0, 1.0, tolerance=0.0)
+
+
+def beside_the_apex(ratio: float, far: float, angle: float, lower: float, ka: float) -> tuple[FieldModel, Disc]:
+    """Return a sensor by r1 over its width, and a disc that all but touches an edge, its middle at `far` times r1."""
+    sheet = SectorSheet.of_sector(0.1 * ratio, 0.1, angle)
+    u, phi = 0.1 * ratio * far, 0.5 * angle
+    radius = 0.98 * float(sheet.edge_distances(u, phi).min())
+    return FieldModel(sheet, 1.0, lower), Disc(u, phi, radius, (ka / radius) ** 2 / (1.0 + lower))
+
+
+@pytest.mark.parametrize(("lower", "ka", "limit"), [(500.0, 3.0, 1e-12), (1e6, 10.0, 1e-10), (1.0, math.inf, 1e-12)])
+def test_beside_the_apex_it_is_solved_to_its_tolerance(lower: float, ka: float, limit: float) -> None:
+    """Against points on the rim, with truncation and quadrature of their own; at 1 : 1e6 these scatter by 4e-11."""
+    model, disc = beside_the_apex(1e-3, 21.0, 2.5, lower, ka)
+    found, reference = model.discs([disc]), rim_solution.solve_rims(model.sheet, 1.0, lower, [disc], 24)
+    ours, theirs = (rim_solution.guide_volts(model.sheet, 1.0, lower, w) for w in (found.matrix()[0], reference))
+    assert np.abs(ours - theirs).max() < limit
+    assert found.error[0] <= 1e-12
+
+
+def test_what_is_not_solved_is_refused() -> None:
+    """A perfect bond 1e-5 radii from an edge, between very unequal sheets; one that all but touches the apex."""
+    model = FieldModel(PAPER, 1.0, 3e-5, tolerance=1e-6)
+    with pytest.raises(FieldError, match=r"scene 0 \(u=0.0200002 m.*only to about .* of the supply, the tolerance is"):
+        model.contacts(0.02 * (1 + 1e-5), 0.7, 0.02)
+    model, disc = beside_the_apex(1e-6, 40.0, 6.0, 500.0, math.inf)
+    with pytest.raises(FieldError, match="leave more room to the apex"):
+        model.discs([disc])
+
+
+def test_a_disc_that_touches_an_edge_is_solved() -> None:
+    """No point may lie where it touches: both distances vanish there, and their ratio was noise of 1e-5."""
+    model = FieldModel(PAPER, 1.0, 2.0)
+    touching, beside = (model.contacts(0.02 * (1 + gap), 0.7, 0.02) for gap in (0.0, 1e-9))
+    assert touching.error[0] <= 1e-12
+    assert touching.conductance[0] == pytest.approx(beside.conductance[0], rel=1e-7)
+    assert touching.x[0] == pytest.approx(beside.x[0], abs=1e-8)
