@@ -202,7 +202,6 @@ def _strength(level: float) -> float:
 
 
 def _between(value: float, knots: Sequence[float], results: Sequence[float]) -> float:
-    """Interpolate between two logarithms."""
     n = next(k for k in range(1, len(knots)) if value <= knots[k] or k == len(knots) - 1)
     share = math.log(value / knots[n - 1]) / math.log(knots[n] / knots[n - 1])
     return results[n - 1] * math.exp(share * math.log(results[n] / results[n - 1]))

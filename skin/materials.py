@@ -142,9 +142,3 @@ class Padding:
     def force(self, depth: float, rate: float) -> float:
         """Return the force of an indentation [m] that grows at a rate [m/s], in N; never below 0."""
         return max(0.0, self.elastic(depth) * (1.0 + self.loss * rate))
-
-    def energy(self, depth: float) -> float:
-        """Return the energy stored in an indentation [J]."""
-        ends = (*(start for start, _, _ in self.pieces[1:]), math.inf)
-        ways = [max(0.0, min(depth, end) - piece[0]) for piece, end in zip(self.pieces, ends, strict=True)]
-        return sum(way * (f + 0.5 * slope * way) for way, (_, f, slope) in zip(ways, self.pieces, strict=True))

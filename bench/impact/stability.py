@@ -23,6 +23,7 @@ from bench.report import head
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
+from tests.support.stored_energy import stored_energy
 
 from .integrators import SERVO_RATE, by_scipy
 
@@ -47,7 +48,7 @@ def free(masses: Sequence[float]) -> None:
             continue
         for stretch in course.stretches:
             s, w, v = stretch.compression[0], stretch.rate[0], stretch.speed[0]
-            energy = 0.5 * arm * (w + v) ** 2 + 0.5 * body * v**2 + contact.padding.energy(s)
+            energy = 0.5 * arm * (w + v) ** 2 + 0.5 * body * v**2 + stored_energy(contact.padding, s)
             change = energy / (0.5 * arm * speed**2) - 1.0
             gain = max(gain, change)
             drift = max(drift, -change if loss == 0.0 else 0.0)

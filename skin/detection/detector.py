@@ -53,25 +53,16 @@ class _StuckValues:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._last: Frame | None = None
-        self._still = (0, 0, 0, 0, 0)
+        self._last = (-1,) * 5
+        self._still = [0] * 5
 
     def feed(self, frame: Frame) -> bool:
         """Take a frame. Tell whether one of its values is stuck."""
         if not self._most:
             return False
-        last, self._last = self._last, frame
-        if last is None:
-            return False
-        a, b, c, d, e = self._still
-        self._still = a, b, c, d, e = (
-            a + 1 if frame.radial_current == last.radial_current else 0,
-            b + 1 if frame.angular_current == last.angular_current else 0,
-            c + 1 if frame.touch_supply == last.touch_supply else 0,
-            d + 1 if frame.radial_supply == last.radial_supply else 0,
-            e + 1 if frame.angular_supply == last.angular_supply else 0,
-        )
-        return a >= (most := self._most) or b >= most or c >= most or d >= most or e >= most
+        last, self._last = self._last, (frame.radial_current, frame.angular_current, *frame[15:18])
+        self._still = [n + 1 if a == b else 0 for n, a, b in zip(self._still, self._last, last, strict=True)]
+        return max(self._still) >= self._most
 
 
 class Detector:

@@ -116,7 +116,6 @@ class FaultDiagnosis:
         return most / self._sensor.electronics.full_count
 
     def _next(self) -> _Fit:
-        """Begin with the next hypothesis."""
         if not self._hypotheses:
             self._hypotheses = list_hypotheses(self._sensor)
         frame, currents = self._frame, self._currents

@@ -50,7 +50,6 @@ def diagnose(capture: Capture, sensors: Sequence[Sensor] = (), baud: int | None 
 
 
 def _stopped(capture: Capture, data: bytes, before: Finding) -> Finding:
-    """Name a stream that has ended, with what it was before."""
     silence = f"nothing has come for {capture.silence:.1f} s"
     if before.item == Cause.TEXT.key and len(data) < 4096:
         return Cause.STOPPED.found(f"{silence}; before, the device wrote {first_line(data)!r}")
@@ -59,7 +58,6 @@ def _stopped(capture: Capture, data: bytes, before: Finding) -> Finding:
 
 
 def _find_without_frames(capture: Capture, data: bytes, baud: int | None) -> Finding:
-    """Name the cause where hardly any frame is valid."""
     rate = len(data) / capture.duration if capture.duration > 0.0 else math.inf  # of a file, whose bytes have no times
     newest = data[-_SHAPE_LENGTH:]
     decoder = FrameDecoder()
@@ -94,7 +92,6 @@ def _find_seven_bits(data: bytes) -> Finding | None:
 
 
 def _find_in_frames(capture: Capture, found: FoundFrames, sensors: Sequence[Sensor]) -> Finding:
-    """Name what is wrong with valid frames, sensor by sensor."""
     by_sensor = capture.by_sensor(found)
     known = {(sensor.device_id, sensor.sensor_id): sensor for sensor in sensors}
     good = []

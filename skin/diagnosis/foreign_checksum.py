@@ -94,7 +94,6 @@ def _find_stale(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | No
 
 
 def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None:
-    """Find a sum, an exclusive or, a Fletcher sum or a CRC of 8 bits."""
     kinds: dict[str, Callable[[bytes], int]] = {
         "the sum of the bytes": sum,
         "the sum of the bytes, negated": lambda data: -sum(data),

@@ -56,7 +56,6 @@ def find_shape(data: bytes) -> Finding | None:
 
 
 def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Finding:
-    """Name why frames are not as long as they should be."""
     right = length if length in FRAME_LENGTHS else min(FRAME_LENGTHS, key=lambda size: (abs(size - period), -size))
     if frames and not any(0 in frame for frame in frames) and len(frames) >= _MIN_STARTS:
         return Cause.ZEROS_LOST.found(f"the frames end after {period} bytes, and no byte of them is 0")
@@ -173,7 +172,6 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
 
 
 def _undo_newlines(data: bytes) -> bytes:
-    """Return the bytes as they were before each line feed became CR LF."""
     return data.replace(b"\r\n", b"\n")
 
 

@@ -236,9 +236,9 @@ def make_circles(
 ) -> Circles:
     """Make the circles of the discs, N points on each; images are of use between unequal sheets."""
     zeta, _, _ = circle(order, points)
-    offset, slope = offsets_of(sheet, discs, zeta)
-    local = discs.radius / sheet.stretch(discs.u)
-    bend = (sheet.curvature * local)[:, :, None]
+    local = discs.radius / sheet.stretch(discs.u)  # a/h, the radius in the rectangle
+    bend = (sheet.curvature * local)[:, :, None]  # q = a/r_c, signed
+    offset, slope = _offsets(local, bend, zeta)
     x, y = sheet.along(discs.u)[0], sheet.across(discs.phi)[0]
     m = np.arange(1, order + 1)
     series = local[:, :, None] * (-bend) ** (m - 1) / m
@@ -254,18 +254,13 @@ def make_circles(
     return Circles(sheet, discs, order, offset * k, slope * k, Centres.of(sheet, strip, discs), fx, fy, images)
 
 
-def offsets_of(sheet: SectorSheet, discs: Discs, zeta: Complex) -> tuple[Complex, Floats]:
-    """Return offsets in the rectangle from the centres to points of the rims, and |d offset / d zeta| [m].
-
-    The points zeta are on the unit circle, shape (N,) or (n, k, N).
-    """
-    local = discs.radius / sheet.stretch(discs.u)  # a/h, the radius in the rectangle
-    if sheet.curvature == 0.0:
+def _offsets(local: Floats, bend: Floats, zeta: Complex) -> tuple[Complex, Floats]:
+    """Return offsets in the rectangle from the centres to points of the rims, and |d offset / d zeta| [m]."""
+    if not bend.any():
         offset = local[:, :, None] * zeta
         return offset, np.broadcast_to(local[:, :, None], offset.shape)
-    bend = (sheet.curvature * local)[:, :, None]  # q = a/r_c, signed
     cos, sin = zeta.real, zeta.imag
-    offset = np.empty((*local.shape, zeta.shape[-1]), dtype=np.complex128)
+    offset = np.empty((*local.shape, zeta.size), dtype=np.complex128)
     over = local[:, :, None] / bend
     # numpy's complex log1p loses digits near zero; the two real ones do not.
     np.multiply(0.5 * np.log1p(bend * (2.0 * cos + bend)), over, out=offset.real)

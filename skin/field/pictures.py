@@ -44,7 +44,6 @@ def _plane(sheet: SectorSheet, u: Floats, phi: Floats) -> tuple[Floats, Floats]:
 
 
 def _outline(axes: Any, sheet: SectorSheet, names: dict[str, str]) -> None:
-    """Draw the four edges with the electrodes' names."""
     one = np.linspace(0.0, 1.0, 100)
     edges = {
         "B": (0.0 * one, one * sheet.wrap),

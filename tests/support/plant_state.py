@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coneskin.impact.simulation.mujoco_plant import MujocoPlant
+from coneskin.skin.materials import Padding
+
+from .stored_energy import stored_energy
 
 
 def switch_off(plant: MujocoPlant, joints: Sequence[int]) -> None:
@@ -46,3 +49,31 @@ def part_velocity(plant: MujocoPlant, part: int) -> list[float]:
     assert at is not None
     velocity: list[float] = plant._d.qvel[at : at + 3].tolist()
     return velocity
+
+
+def account_for_energy(plant: MujocoPlant, q: Sequence[float], qd: Sequence[float], duration: float) -> list[float]:
+    """Let time pass in pieces of 0.1 ms; return the energy before [J], and after with what damping has taken."""
+    padding: Padding = plant._padding
+    lost, rate, step = 0.0, _damped_power(plant, padding), 1e-4
+    before = _energy(plant, padding)
+    for number in range(round(duration / step)):
+        plant.update([at + number * step * speed for at, speed in zip(q, qd, strict=True)], qd, step)
+        last, rate = rate, _damped_power(plant, padding)
+        lost += 0.5 * step * (last + rate)
+    return [before, _energy(plant, padding) + lost]
+
+
+def _energy(plant: MujocoPlant, padding: Padding) -> float:
+    """Return the energy of motion, of springs and of the padding [J]."""
+    plant._mj.mj_energyPos(plant._m, plant._d)
+    plant._mj.mj_energyVel(plant._m, plant._d)
+    stored = sum(stored_energy(padding, contact.depth) for contact in plant.contacts)
+    return float(plant._d.energy[0] + plant._d.energy[1]) + stored
+
+
+def _damped_power(plant: MujocoPlant, padding: Padding) -> float:
+    """Return what damping in padding and springs takes [W]."""
+    taken = sum((each.force - padding.elastic(each.depth)) * each.rate for each in plant.contacts)
+    for _, at in plant._moving:
+        taken += float(plant._m.dof_damping[at]) * float(np.sum(plant._d.qvel[at : at + 3] ** 2))
+    return taken

@@ -363,7 +363,6 @@ class PlaceEstimator:
         )
 
     def _edge(self, x: float, y: float) -> float:
-        """Return the distance to the nearest edge, in the rectangle [m]."""
         return min(x, self.length - x, y, self.breadth - y)
 
 

@@ -170,7 +170,6 @@ class TouchPlace:
         return (u, phi) if self._map is None else self._map.apply(u, phi)
 
     def _contacts(self, reading: Reading) -> ContactMatrix | None:
-        """Return what the contacts are to the electrodes, the leak taken off."""
         matrix = reading.matrix
         if matrix is None:
             self._newest = None
@@ -187,7 +186,6 @@ class TouchPlace:
         self._estimate: PlaceEstimate | None = None
 
     def _solve(self, frame: Frame, now: float, period: float) -> PlaceEstimate:
-        """Make the estimate anew."""
         mean, frames = ContactMatrix(*self._filter.values, 0.0, 0.0, 0.0), self._filter.frames
         noise = self._noise
         if frames == 1 or noise is None:

@@ -231,7 +231,7 @@ def test_what_is_not_solved_is_refused() -> None:
     model = FieldModel(PAPER, 1.0, 3e-5, tolerance=1e-6)
     with pytest.raises(FieldError, match=r"scene 0 \(u=0.0200002 m.*only to about .* of the supply, the tolerance is"):
         model.contacts(0.02 * (1 + 1e-5), 0.7, 0.02)
-    model, disc = beside_the_apex(1e-6, 40.0, 6.0, 500.0, math.inf)
+    model, disc = beside_the_apex(1e-6, 1000.0, 6.0, 500.0, math.inf)
     with pytest.raises(FieldError, match="leave more room to the apex"):
         model.discs([disc])
 

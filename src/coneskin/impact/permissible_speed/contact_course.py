@@ -50,7 +50,6 @@ def evaluate(series: Sequence[float], t: float) -> float:
 
 
 def _slope_of(series: Sequence[float]) -> list[float]:
-    """Return the coefficients of the derivative."""
     return [n * coefficient for n, coefficient in enumerate(series)][1:]
 
 

@@ -48,7 +48,6 @@ _SPEED_TOLERANCE = 4e-3  # of the speed that is found
 
 
 def _keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
-    """Tell whether a contact keeps limits."""
     if model.static(model.arm.stopping_way)[0] > limits.lasting:
         return False  # known without a look at the course: the time to the closing makes it no better
     course = integrate(model, keep=False, stop_above=limits.transient)

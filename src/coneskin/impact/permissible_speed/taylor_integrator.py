@@ -216,8 +216,6 @@ def integrate(
 
 
 class _Integration:
-    """State of one integration."""
-
     def __init__(self, model: TwoMassContact, horizon: float, keep: bool, stop_above: float, tolerance: float) -> None:
         self.model, self.horizon, self.keep, self.stop_above = model, horizon, keep, stop_above
         self.tolerance, self.max_tail = tolerance, max(tolerance, _MIN_TAIL)
@@ -249,7 +247,6 @@ class _Integration:
         return ContactState(self.s, self.w, self.x, self.v, self.way, self.drive, self.braking, elastic, slope)
 
     def _by_series(self, room: float) -> _Step:
-        """Return the step of the Taylor series."""
         start = self._state()
         series = expand(self.model, start)
         self.pace = reach(series, self.tolerance)

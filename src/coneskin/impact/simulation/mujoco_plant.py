@@ -88,27 +88,13 @@ class _BodyContact(NamedTuple):
 
     sheet: int  #: number of the skin
     part: int  #: number of the part, over all bodies
-    u: float  #: slant distance from end 1 [m]
-    phi: float  #: azimuth [rad]
     depth: float  #: indentation of the padding [m]
     rate: float  #: its growth [m/s]
     force: float  #: [N]
-    normal: Vector  #: outward unit normal of the skin, in the base frame
-    bare: bool  #: no skin is there
-
-
-class Touch(NamedTuple):
-    """Contact as one step of the integration needs it; fields as of `_BodyContact`."""
-
-    sheet: int
-    part: int
-    depth: float
-    rate: float
-    force: float
-    normal: Floats
-    point: Floats
+    normal: Floats  #: outward unit normal of the skin, in the base frame
+    point: Floats  #: in the base frame [m]
     jacobian: Floats  #: of the point, for the arm's joints, 3 x 6
-    bare: bool = False  #: no skin is there
+    bare: bool  #: no skin is there
 
 
 class MujocoPlant:
@@ -133,7 +119,6 @@ class MujocoPlant:
         impulse: that all contacts together have given, over time [N s].
         deepest: greatest indentation so far [m].
         peak: greatest force of one skin on one body so far [N].
-        lost: energy that damping in padding and springs has taken [J], with a period of 1.
 
     Raises:
         MissingExtra: MuJoCo is not installed.
@@ -180,12 +165,11 @@ class MujocoPlant:
         self._d.qpos[:_ARM_DOF], self._d.qvel[:_ARM_DOF] = q, qd
         self._starts = [place for body in bodies for place in body.parts]
         self._moving = [(number, at) for number, at in enumerate(self._address) if at is not None]
-        self._damping = [0.0 if at is None else float(self._m.dof_damping[at]) for at in self._address]
         self._touched: dict[int, float] = {}  # body -> when it was first touched
         self._body_numbers = [n for n, body in enumerate(bodies) for _ in body.parts]
         self.time = 0.0
         self.contacts: tuple[_BodyContact, ...] = ()
-        self.impulse = self.deepest = self.peak = self.lost = 0.0
+        self.impulse = self.deepest = self.peak = 0.0
         mujoco.mj_forward(self._m, self._d)
 
     # state
@@ -222,18 +206,10 @@ class MujocoPlant:
         for contact in self.contacts:
             skin = self._sheets[contact.sheet]
             cone = skin.cone.frustum
-            active = 0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap
-            if active and not contact.bare:
-                found[contact.sheet, contact.part] = Press(skin.name, contact.u, contact.phi, contact.force)
+            u, phi = self._locate(contact.sheet, contact.point)
+            if not contact.bare and 0.0 <= u <= cone.slant and 0.0 <= phi <= cone.wrap:
+                found[contact.sheet, contact.part] = Press(skin.name, u, phi, contact.force)
         return found
-
-    @property
-    def energy(self) -> float:
-        """Energy of motion, of springs and of the padding [J]."""
-        self._mj.mj_energyPos(self._m, self._d)
-        self._mj.mj_energyVel(self._m, self._d)
-        stored = sum(self._padding.energy(contact.depth) for contact in self.contacts)
-        return float(self._d.energy[0] + self._d.energy[1]) + stored
 
     @property
     def diverged(self) -> bool:
@@ -267,7 +243,7 @@ class MujocoPlant:
         speed = np.asarray(qd, float)
         moved = step * speed
         target = np.asarray(q, float) + self._lead * speed  # a servo that damps its speed would follow behind by this
-        near: list[tuple[Touch, Floats]] = []
+        near: list[tuple[_BodyContact, Floats]] = []
         for number in range(round(duration / step)):
             look = number % self._period == 0
             m.opt.disableflags = 0 if look else no_contacts
@@ -281,14 +257,10 @@ class MujocoPlant:
             target += moved
             self.time += step
         m.opt.disableflags = 0
-        self._look()
+        self._mj.mj_fwdPosition(m, d)
+        self.contacts = tuple(self._find())
 
-    def _look(self) -> None:
-        """Look where skins and bodies touch now."""
-        self._mj.mj_fwdPosition(self._m, self._d)
-        self.contacts = tuple(self._contact(touch) for touch in self._find())
-
-    def _row(self, touch: Touch) -> Floats:
+    def _row(self, touch: _BodyContact) -> Floats:
         """Return what gives the rate of an indentation from all speeds, and the forces on all of them from its own."""
         row: Floats = np.zeros(self._m.nv)
         row[:_ARM_DOF] = touch.normal @ touch.jacobian
@@ -296,7 +268,7 @@ class MujocoPlant:
             row[at : at + 3] = -touch.normal
         return row
 
-    def _press(self, near: Sequence[tuple[Touch, Floats]], depths: list[float]) -> None:
+    def _press(self, near: Sequence[tuple[_BodyContact, Floats]], depths: list[float]) -> None:
         """Put the forces of contacts on skins and bodies, and let people act; the depths grow with the speeds."""
         d, step = self._d, self._step
         applied, velocity = d.qfrc_applied, d.qvel
@@ -311,19 +283,14 @@ class MujocoPlant:
             applied -= force * row
             self.impulse += force * step
             self.deepest, self.peak = max(self.deepest, depth), max(self.peak, force)
-            if self._period == 1:
-                self.lost += (force - self._law(touch).elastic(depth)) * rate * step
             self._touched.setdefault(self._body_numbers[touch.part], self.time)
             felt.setdefault(touch.part, []).append((force, touch.normal))
-        for number, at in self._moving if self._period == 1 else ():
-            x, y, z = velocity[at : at + 3].tolist()
-            self.lost += self._damping[number] * (x * x + y * y + z * z) * step
         for number, at in self._moving:
             part, since = self.parts[number], self.time - self._touched.get(self._body_numbers[number], math.inf)
             if part.update(since, felt.get(number, ()), self._step):
                 self._m.qpos_spring[at : at + 3] = part.rest
 
-    def _find(self, near: float = 0.0) -> list[Touch]:
+    def _find(self, near: float = 0.0) -> list[_BodyContact]:
         """Return what touches, or is nearer than that [m]: one contact for each skin and part, amid MuJoCo's points.
 
         A second one is that of a part beside the end of a sheet with the strip beyond it (``_edge``).
@@ -354,16 +321,16 @@ class MujocoPlant:
         found: list[tuple[float, int, float]],
         frames: Floats,
         places: Floats,
-    ) -> Touch:
+    ) -> _BodyContact:
         depth, index, sign = max(found)
-        normal, point = sign * frames[index, :3], places[index]
+        normal, point = sign * frames[index, :3], np.array(places[index])
         found = [item for item in found if item[0] > 0.0]
         if len(found) > 1:
             whole = math.fsum(item[0] for item in found)
             point = sum((item[0] / whole * places[item[1]] for item in found), np.zeros(3))
         return self._made(sheet, part, depth, normal, point, self._is_bare(sheet, point))
 
-    def _edge(self, touch: Touch) -> Touch | None:
+    def _edge(self, touch: _BodyContact) -> _BodyContact | None:
         """Return the contact of what presses a skin with the end of the lacquer beside it. None where there is none.
 
         Skin and strip have one height. What is deep in the pad reaches beyond the end of the sheet, as deep as the
@@ -373,7 +340,7 @@ class MujocoPlant:
         cone, body = self._sheets[touch.sheet].cone, self.parts[touch.part].body
         if touch.bare or cone.frustum.wrap == math.tau:
             return None
-        u, phi, _ = self._locate(touch.sheet, touch.point)
+        u, phi = self._locate(touch.sheet, touch.point)
         end = 0.0 if 2.0 * phi < cone.frustum.wrap else cone.frustum.wrap
         surface, point = self._place(touch.sheet, u, phi), self._place(touch.sheet, u, end)
         normal, depth = touch.normal, touch.depth - float(touch.normal @ (surface - point))
@@ -386,7 +353,7 @@ class MujocoPlant:
             normal, depth = way / size, body.radius - size
         return self._made(touch.sheet, touch.part, depth, normal, point, True)
 
-    def _made(self, sheet: int, part: int, depth: float, normal: Floats, point: Floats, bare: bool) -> Touch:
+    def _made(self, sheet: int, part: int, depth: float, normal: Floats, point: Floats, bare: bool) -> _BodyContact:
         jacobian = np.empty((3, self._m.nv))
         self._mj.mj_jac(self._m, self._d, jacobian, None, point, self._links[sheet])
         jacobian = jacobian[:, :_ARM_DOF]
@@ -394,7 +361,7 @@ class MujocoPlant:
         if (at := self._address[part]) is not None:
             speed -= self._d.qvel[at : at + 3]
         rate = float(speed @ normal)
-        touch = Touch(sheet, part, depth, rate, 0.0, normal, point, jacobian, bare)
+        touch = _BodyContact(sheet, part, depth, rate, 0.0, normal, point, jacobian, bare)
         return touch._replace(force=self._law(touch).force(depth, rate))
 
     def _is_bare(self, sheet: int, point: Floats) -> bool:
@@ -404,15 +371,16 @@ class MujocoPlant:
             return sheet >= self._skins
         return self._locate(sheet, point)[1] > frustum.wrap
 
-    def _law(self, touch: Touch) -> Padding:
+    def _law(self, touch: _BodyContact) -> Padding:
         return _BARE_LINK if touch.bare else self._padding
 
-    def _locate(self, sheet: int, point: Floats) -> Vector:
+    def _locate(self, sheet: int, point: Floats) -> tuple[float, float]:
+        """Return u [m] and phi [rad] of a point of the base frame."""
         link = self._links[sheet]
         axes = self._d.xmat[link].reshape(3, 3)
         x, y, z = (axes.T @ (point - self._d.xpos[link])).tolist()
-        u, phi, distance = self._sheets[sheet].cone.locate(self._back[sheet].apply((x, y, z)))
-        return u, phi % math.tau, distance
+        u, phi, _ = self._sheets[sheet].cone.locate(self._back[sheet].apply((x, y, z)))
+        return u, phi % math.tau
 
     def _place(self, sheet: int, u: float, phi: float) -> Floats:
         """Return a point of a sheet's side in the base frame [m]; the inverse of ``_locate``."""
@@ -420,9 +388,3 @@ class MujocoPlant:
         inside = self._back[sheet].inverse().apply(self._sheets[sheet].cone.point(u, phi))
         place: Floats = self._d.xmat[link].reshape(3, 3) @ np.asarray(inside) + self._d.xpos[link]
         return place
-
-    def _contact(self, touch: Touch) -> _BodyContact:
-        u, phi, _ = self._locate(touch.sheet, touch.point)
-        x, y, z = touch.normal.tolist()
-        where = touch.sheet, touch.part, u, phi
-        return _BodyContact(*where, touch.depth, touch.rate, touch.force, (x, y, z), touch.bare)

@@ -87,7 +87,6 @@ def main(arguments: list[str]) -> int:
 
 
 def _report(program: Channel, meter: ImpactMeter) -> None:
-    """Answer the program, which asks what has come of it so far."""
     for _ in program.receive():
         program.send(encode_json(finite({**asdict(meter.outcome), "began": meter.began})))
 
