@@ -291,7 +291,9 @@ class DriverProcess:
             sent = min(float(request["sent"]), now)  # what is said to come from later holds no longer
             age = now - sent
             if request["do"] != "stop" and not age <= self._request_lifetime:
-                self._reply(number, ok=False, stopped=False, void=True, why=_void(age, self._request_lifetime))
+                why = f"it was sent {age:.2f} s ago, and holds for {self._request_lifetime:g} s"
+                why = f"it is void: {why}; this process was held up"
+                self._reply(number, ok=False, stopped=False, void=True, why=why)
             elif not self._allowed:
                 self._reply(number, ok=False, stopped=True, why="the guard does not let the arm move")
             elif request["do"] == "stop":
@@ -334,11 +336,6 @@ class DriverProcess:
 
     def _reply(self, number: int, **answer: Any) -> None:
         self._program.send(encode_json({"number": number, **answer}))
-
-
-def _void(age: float, lifetime: float) -> str:
-    """Return why a request of this age [s] is not carried out."""
-    return f"it is void: it was sent {age:.2f} s ago, and holds for {lifetime:g} s; this process was held up"
 
 
 def main(arguments: list[str]) -> int:

@@ -87,13 +87,12 @@ class StopSockets(TcpStops):
 
     def refusal(self, name: str, data: bytes) -> str:
         """Return that the controller is in local control, where the dashboard has said so."""
-        return f"the controller {self.host} {_LOCAL_CONTROL}" if name == "command" and self._is_local(data) else ""
-
-    def _is_local(self, data: bytes) -> bool:
-        """Take what the dashboard has said; tell whether that is the answer of local control."""
+        if name != "command":
+            return ""
         *lines, self._said = (self._said + data).split(b"\n")
         self._said = self._said[-_MAX_ANSWER:]
-        return any(line.strip().lower() == b"false" or line.lower().startswith(_LOCAL_REFUSAL) for line in lines)
+        local = any(line.strip().lower() == b"false" or line.lower().startswith(_LOCAL_REFUSAL) for line in lines)
+        return f"the controller {self.host} {_LOCAL_CONTROL}" if local else ""
 
     def _prove_remote(self, sock: socket.socket) -> None:
         """Wait for the dashboard's answer: a connection alone proves no stop."""

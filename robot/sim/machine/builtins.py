@@ -66,7 +66,7 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
 
     def end_interpreter(self) -> None:
         """End interpreter mode."""
-        self._program.interpreter.end()
+        self._program.interpreter.active = False
 
     def clear_interpreter(self) -> None:
         """Forget what statements of interpreter mode have defined."""
@@ -225,9 +225,7 @@ class Builtins(MoveFunctions, IoFunctions, SocketFunctions, ValueFunctions):
         number(transition_time, "a transition time")
         self.set_payload(m, cog, inertia)
 
-    def set_payload_mass(self, m: float) -> None:
-        """Set the mass of the payload [kg]."""
-        self.set_payload(m)
+    set_payload_mass = set_payload
 
     def set_payload_cog(self, CoG: Any) -> None:
         """Set the centre of gravity of the payload [m]."""

@@ -197,7 +197,7 @@ class Controller(ScriptHost):
         return True
 
     def _check_watchdog(self, watchdog: InputWatchdog) -> None:
-        if self.runtime is not Runtime.PLAYING or not watchdog.expired(self.cycle):
+        if self.runtime is not Runtime.PLAYING or (self.cycle - watchdog.fed) * CYCLE <= watchdog.period:
             return
         self.log("watchdog", variable=watchdog.variable, action=watchdog.action)
         if watchdog.action == "stop":

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.sim.motion.arm import CYCLE
 from coneskin.robot.ur.rtde_codec import VARIABLES, Value
 
 #: registers in which ur_rtde writes the number of a command, with register offset 0 and 24
@@ -42,10 +41,6 @@ class InputWatchdog:
     period: float  #: longest time between two writes [s]
     action: str  #: effect on the program when it expires: "pause", "stop" or "ignore"
     fed: int  #: cycle of the last write
-
-    def expired(self, cycle: int) -> bool:
-        """Return whether the last write is too long ago at a cycle."""
-        return (cycle - self.fed) * CYCLE > self.period
 
 
 class ClientInputs:

@@ -20,7 +20,7 @@ from coneskin.robot.sim.urscript.values import OPERATIONS, ScriptError, call_met
 
 from .builtins import Builtins
 from .io_functions import AbsentHandle
-from .script_host import ScriptHost, ScriptSocket
+from .script_host import CallingProgram, ScriptHost
 from .socket_functions import RemoteHandle
 
 _MAX_STEPS = 200  # turns of loops, and calls, of a thread in one cycle: its time slice
@@ -41,46 +41,27 @@ class _Halted(Exception):
     """Statement ``halt`` of a program."""
 
 
-class Program:
+class Program(CallingProgram):
     """Program with its compiled text and the state of its threads.
 
     Attributes:
-        name: name in the program's text.
         secondary: True for a ``sec`` program, which runs beside the main one and must not move the arm.
         driver: thread that moves the arm, or None.
         driven: cycle in which that thread last did; -1 before the first time.
         current: thread that runs now.
-        sockets: connections that it has opened, by their names.
-        told: what its clients have been told is not simulated.
-        signals: of Modbus units, name -> value.
-        damping: of force mode, 0..1.
-        gain_scaling: of force mode, 0..2.
         interpreter: of the statements that come while it runs.
     """
 
     def __init__(self, host: ScriptHost, translation: Translation) -> None:
-        self._host = host
-        self.name, self.secondary = translation.name, translation.secondary
+        super().__init__(translation.name)
+        self._host, self.secondary = host, translation.secondary
         self.driver: Thread | None = None
         self.driven = -1
         self.current: Thread
-        self.sockets: dict[str, ScriptSocket] = {}
-        self.told: set[str] = set()
-        self.signals: dict[str, Any] = {}
-        self.damping, self.gain_scaling = 0.025, 1.0  # of force mode, until the program sets them
         self._steps = 0
         self._end_time = 0.0
-        space: dict[str, Any] = {
-            **OPERATIONS,
-            "_absent": object(),
-            "_halt": self._halt,
-            "_pause": self._pause,
-            "_join": self._join,
-            "_kill": self._kill,
-            "_run": self._run,
-            "_spent": self._spent,
-            "_method": self._call_method,
-        }
+        own = {name: getattr(self, name) for name in ("_halt", "_pause", "_join", "_kill", "_run", "_spent", "_method")}
+        space: dict[str, Any] = {**OPERATIONS, "_absent": object(), **own}
         builtins = Builtins(host, self)
         space |= {f"b_{name}": getattr(builtins, name) for name in Builtins.functions()}
         exec(marshal.loads(translation.code), space)  # the text was parsed, and nothing but its own names is in it
@@ -188,7 +169,7 @@ class Program:
             raise ScriptError("a secondary program must take no time, and this one has used its time slice")
         return spent
 
-    def _call_method(self, base: Any, keys: Any, name: str, arguments: Any) -> Generator[None, None, tuple[Any, Any]]:
+    def _method(self, base: Any, keys: Any, name: str, arguments: Any) -> Generator[None, None, tuple[Any, Any]]:
         """Call a method of what is found in a value; return the value after it, and what the method returns."""
         found = OPERATIONS["_at"](base, *keys)
         if isinstance(found, RemoteHandle | AbsentHandle):

@@ -9,7 +9,7 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE, TRIGGERED, SimulatedArm, StopCause
@@ -103,19 +103,21 @@ class ScriptSocket:
             self._socket.close()
 
 
-class CallingProgram(Protocol):
-    """Program that calls a URScript function."""
+class CallingProgram:
+    """Program as the URScript functions see it that it calls."""
 
-    name: str
-    sockets: dict[str, ScriptSocket]
-    told: set[str]
-    signals: dict[str, Any]
-    damping: float
-    gain_scaling: float
     interpreter: Interpreter
+
+    def __init__(self, name: str) -> None:
+        self.name = name  #: in the program's text
+        self.sockets: dict[str, ScriptSocket] = {}  #: connections that it has opened, by their names
+        self.told: set[str] = set()  #: what its clients have been told is not simulated
+        self.signals: dict[str, Any] = {}  #: of Modbus units, name -> value
+        self.damping, self.gain_scaling = 0.025, 1.0  #: of force mode, until the program sets them
 
     def drive(self) -> None:
         """Claim the arm for the thread that runs now; see `Program.drive`."""
+        raise NotImplementedError
 
 
 _MAX_NOTICES = 1000  # that wait to be sent; a program that writes more in a cycle loses the oldest

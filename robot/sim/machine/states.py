@@ -12,7 +12,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Literal
 
-from coneskin.robot.ur.rtde_codec import SafetyMode
+from coneskin.robot.ur.rtde_codec import RobotMode, SafetyMode
 
 
 class Runtime(IntEnum):
@@ -45,6 +45,11 @@ SAFETY_BITS = {
     SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
     SafetyMode.FAULT: 1 << 9 | 1 << 10,
 }
+
+
+def joint_mode(mode: RobotMode) -> int:
+    """Return RTDE's joint_mode, and its tool_mode, of an arm that runs, stands with its brakes on, or is off."""
+    return {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}.get(mode, 239)
 
 
 #: states in which the arm may move and programs run

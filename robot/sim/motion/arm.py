@@ -54,11 +54,6 @@ _NEAR_SINGULARITY = StopCause(
 TRIGGERED = StopCause(209, 0, "A protective stop was triggered (for test purposes only)")
 
 
-def _deviation(joint: int) -> StopCause:
-    """Return the cause of a joint, counted from 0, that cannot follow its path."""
-    return StopCause(153, joint, f"Position deviates from path: Detected by the {_JOINT_NAMES[joint]} joint.")
-
-
 CONTROLLER_DECELERATION = 10.0  #: of the leading joint where the command gives none [rad/s^2]; an assumption
 JOINT_ACCELERATION = 40.0  #: highest acceleration of a joint, as a UR5e reports it in its configuration [rad/s^2]
 MAX_ACCELERATION = 100.0  #: of a joint; a step of speed beyond it is a trajectory fault [rad/s^2]
@@ -253,7 +248,8 @@ class SimulatedArm:
         for i, (torque, limit) in enumerate(zip(torques, self.inertia.torque, strict=True)):
             if abs(torque) > limit:
                 detail = f"it takes {abs(torque):.0f} N m, and the motor has {limit:.0f} N m"
-                raise MotionFault(_deviation(i), detail)
+                title = f"Position deviates from path: Detected by the {_JOINT_NAMES[i]} joint."
+                raise MotionFault(StopCause(153, i, title), detail)
 
     def feasible_acceleration(self, direction: Sequence[float]) -> float:
         """Return the highest acceleration in a direction for which the motors have the torque."""

@@ -1,7 +1,7 @@
 """Motions of the simulated arm that follow a speed or a stream of positions, and stops, in steps of 2 ms.
 
 Continuous position and speed, bounded acceleration. Assumed, because no manual says it: the deceleration of a pause, of
-a safeguard stop and of a program that ends while the arm moves (`CONTROLLER_DECELERATION`).
+a safeguard stop and of a program that ends while the arm moves (`Options.deceleration`).
 """
 
 from __future__ import annotations
@@ -9,16 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .arm import (
-    CONTROLLER_DECELERATION,
-    CYCLE,
-    JOINT_ACCELERATION,
-    MAX_ACCELERATION,
-    SUDDEN_CHANGE,
-    MotionFault,
-    SimulatedArm,
-    max_abs,
-)
+from .arm import CYCLE, JOINT_ACCELERATION, MAX_ACCELERATION, SUDDEN_CHANGE, MotionFault, SimulatedArm, max_abs
 
 
 class _Sustained:
@@ -166,5 +157,5 @@ class StopTool(StopJoints):
         duration = max(
             math.hypot(*twist[:3]) / max(abs(deceleration), 1e-3), math.hypot(*twist[3:]) / max(abs(angular), 1e-3)
         )
-        rate = max_abs(arm.qd) / duration if duration > 0.0 else CONTROLLER_DECELERATION
+        rate = max_abs(arm.qd) / duration if duration > 0.0 else arm.deceleration
         super().__init__(min(rate, MAX_ACCELERATION / 2.0))

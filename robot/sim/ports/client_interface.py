@@ -120,7 +120,6 @@ ROBOT_STATE = 16  #: kind of a packet that holds the state
 _MODE, _JOINTS, _TOOL, _BOARD, _CARTESIAN, _KINEMATICS, _CONFIGURATION = 0, 1, 2, 3, 4, 5, 6
 _FORCES, _ADDITIONAL, _CALIBRATION, _SAFETY, _TOOL_LINE, _TOOL_OUTPUTS = 7, 8, 9, 10, 11, 12
 _CONTROL_MODE_POSITION = 0
-_JOINT_RUNNING, _JOINT_OFF, _JOINT_IDLE = 253, 239, 255  # modes of a joint
 _TOOL_RUNNING = 253  # mode of the tool
 #: size of an arm -> its number as robot type
 _ROBOT_TYPES = {"UR5": 1, "UR7": 1, "UR10": 2, "UR12": 2, "UR3": 3, "UR16": 4, "UR18": 5, "UR8 Long": 6}
@@ -148,9 +147,8 @@ def _changing(c: Controller) -> Iterable[bytes]:
     mode = struct.pack(">Q7BBBddd", time, *flags, c.robot_mode, _CONTROL_MODE_POSITION, c.slider, scaling, 1.0)
     last = b"" if c.options.version[0] == 3 else bytes(1)  # a byte that CB3 does not have, here and below
     yield _pack(_MODE, mode + last)
-    of_joint = {RobotMode.RUNNING: _JOINT_RUNNING, RobotMode.IDLE: _JOINT_IDLE}.get(c.robot_mode, _JOINT_OFF)
     joints = (
-        struct.pack(">dddffffB", q, target, qd, current, 48.0 * powered, 30.0, 0.0, of_joint)
+        struct.pack(">dddffffB", q, target, qd, current, 48.0 * powered, 30.0, 0.0, states.joint_mode(c.robot_mode))
         for q, target, qd, current in zip(arm.measured.q, arm.q, arm.measured.qd, c.currents, strict=True)
     )
     yield _pack(_JOINTS, b"".join(joints))
@@ -302,12 +300,12 @@ def interpreter_reply(controller: Controller, line: str) -> str:
         "statelastexecuted": interpreter.executed,
         "statelastinterpreted": interpreter.interpreted,
         "statelastcleared": interpreter.cleared,
-        "stateunexecuted": interpreter.unexecuted,
+        "stateunexecuted": len(interpreter.queue),
     }
     if statement in answers:
         return f"state: {answers[statement]}: {statement}"
     if statement == "skipbuffer":
-        interpreter.skip()
+        interpreter.queue.clear()
     elif statement == "abort":
         interpreter.aborts = isinstance(controller.arm.motion, Path)
     else:

@@ -19,14 +19,12 @@ from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.kinematics import link_pose, point_jacobian
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.inputs_outputs import INPUTS
-from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, Runtime, Version, has_since
+from coneskin.robot.sim.machine.states import MOVING, SAFETY_BITS, Runtime, Version, has_since, joint_mode
 from coneskin.robot.sim.motion.arm import SimulatedArm
 from coneskin.robot.sim.urscript.values import Array, ScriptError, values_of
 from coneskin.robot.ur import rtde_codec as wire
 
 _ELBOW_FRAME = 2  # number of the frame at the elbow
-_JOINT_OFF = 239
-_JOINT_MODES = {wire.RobotMode.RUNNING: 253, wire.RobotMode.IDLE: 255}  # of joints, and of the tool
 _SIX_ZEROS = (0.0,) * 6  # six zeros, for any vector of that length
 #: output -> constant value of a sensor that is not simulated, in the unit of RTDE
 _CONSTANT_OUTPUTS: dict[str, wire.Value] = {
@@ -113,8 +111,8 @@ class RtdeOutputs:
             "tool_digital_output1_mode": lambda: c.terminals.tool_drive_modes[1],
             "output_bit_registers0_to_31": lambda: c.terminals.output_bits & 0xFFFFFFFF,
             "output_bit_registers32_to_63": lambda: c.terminals.output_bits >> 32 & 0xFFFFFFFF,
-            "joint_mode": lambda: (_JOINT_MODES.get(c.robot_mode, _JOINT_OFF),) * 6,
-            "tool_mode": lambda: _JOINT_MODES.get(c.robot_mode, _JOINT_OFF),
+            "joint_mode": lambda: (joint_mode(c.robot_mode),) * 6,
+            "tool_mode": lambda: joint_mode(c.robot_mode),
             "elbow_position": lambda: link_pose(arm.model, arm.measured.q, _ELBOW_FRAME).translation,
             "elbow_velocity": lambda: elbow_velocity(arm),
             "actual_TCP_force": c.inputs.wrench,
@@ -132,13 +130,9 @@ class RtdeOutputs:
         register, _, digits = name.rpartition("_")
         if register == "output_bit_register":
             return lambda: c.terminals.output_bits >> int(digits) & 1
-        registers: dict[str, Sequence[float]] = {
-            "output_int_register": c.output_ints,
-            "output_double_register": c.output_doubles,
-        }
-        if register in registers:
-            values, index = registers[register], int(digits)
-            return lambda: values[index]
+        if register in ("output_int_register", "output_double_register"):
+            values: Sequence[float] = c.output_ints if register == "output_int_register" else c.output_doubles
+            return lambda: values[int(digits)]
         if name in c.inputs.values and name.startswith("input_"):
             return lambda: c.inputs.values[name]
         kind = wire.VARIABLES[name]

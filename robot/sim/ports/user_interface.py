@@ -41,11 +41,6 @@ class ProgramFile:
     text: str  #: its URScript, from ``def`` to ``end``
 
     @property
-    def takes_external_script(self) -> bool:
-        """True where a node of it takes its script from another program."""
-        return EXTERNAL_CONTROL in self.text
-
-    @property
     def function(self) -> str:
         """Name of the program in its text; empty where it has none."""
         match = re.search(r"^[ \t]*def[ \t]+(\w+)", self.text, re.MULTILINE)
@@ -255,7 +250,7 @@ class UserInterface:
         except ScriptError as exc:
             controller.fail(self.loaded.name, exc)
             return False
-        if self.loaded.takes_external_script:
+        if EXTERNAL_CONTROL in self.loaded.text:
             self._request = _request_script(controller.options.external_control)
         else:
             self.run(self.loaded.text)

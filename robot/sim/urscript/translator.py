@@ -390,6 +390,8 @@ class Interpreter:
         builtins: names of the controller's functions -> whether they take time.
 
     Attributes:
+        queue: statements that wait, with their numbers.
+        active: True in interpreter mode; False ends it once the present statement is done.
         executed: number of the last statement that has begun; 0 before the first.
         interpreted: number of the last one that was taken.
         cleared: number of the last one that was cleared.
@@ -399,15 +401,10 @@ class Interpreter:
     def __init__(self, space: dict[str, Any], names: Names, builtins: Mapping[str, bool]) -> None:
         self._space, self._of_program, self._names = space, names, names
         self._builtins = builtins
-        self._queue: deque[tuple[int, Translation]] = deque()
-        self._active = False
+        self.queue: deque[tuple[int, Translation]] = deque()
+        self.active = False
         self.executed = self.interpreted = self.cleared = 0
         self.aborts = False
-
-    @property
-    def unexecuted(self) -> int:
-        """Number of statements that wait."""
-        return len(self._queue)
 
     def take(self, line: str) -> int:
         """Take a line of statements, and return its number.
@@ -423,16 +420,8 @@ class Interpreter:
         made = translate(line, self._builtins, self._names)
         self._names = Names(made.names.functions, self._names.shared)
         self.interpreted += 1
-        self._queue.append((self.interpreted, made))
+        self.queue.append((self.interpreted, made))
         return self.interpreted
-
-    def skip(self) -> None:
-        """Forget what waits."""
-        self._queue.clear()
-
-    def end(self) -> None:
-        """End interpreter mode once the present statement is done."""
-        self._active = False
 
     def clear(self) -> None:
         """Forget the functions that statements have defined."""
@@ -445,16 +434,16 @@ class Interpreter:
         Raises:
             ScriptError: a statement has failed.
         """
-        if self._active:
+        if self.active:
             raise ScriptError("interpreter_mode() must not be called within interpreter mode")
         if clear_queue:
-            self.skip()
-        self._active = True
-        while self._active:
-            if not self._queue:
+            self.queue.clear()
+        self.active = True
+        while self.active:
+            if not self.queue:
                 yield
                 continue
-            self.executed, made = self._queue.popleft()
+            self.executed, made = self.queue.popleft()
             exec(marshal.loads(made.code), self._space)
             try:
                 yield from self._space["main"]()

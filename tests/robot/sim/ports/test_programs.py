@@ -16,7 +16,7 @@ def test_a_program_is_the_script_beside_it(tmp_path: Path) -> None:
     save_program(tmp_path, "external_control", EXTERNAL)
     waits, external = (ProgramFolder(tmp_path).load(f"{name}.urp") for name in ("wait", "external_control"))
     assert (waits.name, waits.path, waits.text, waits.function) == ("wait.urp", "/programs/wait.urp", WAIT, "wait")
-    assert (waits.takes_external_script, external.takes_external_script) == (False, True)
+    assert (EXTERNAL_CONTROL in waits.text, EXTERNAL_CONTROL in external.text) == (False, True)
 
 
 def test_a_program_without_its_script_is_refused_with_what_to_write(tmp_path: Path) -> None:
