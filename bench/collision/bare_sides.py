@@ -53,7 +53,7 @@ LONGEST = 3.0  # s
 MET = 1.0  # N behind a bare stop, from which on the body was in the arm's way before: such a case is left out
 SETTLED = 2.5  # s after the first contact, in every way alike: a grip that closes later presses a bare stop as well
 AT_REST = 0.8  # s after it, from which on a latched arm at rest among hands at rest has nothing more to show
-REST = 0.1, 0.02, 1e-5  # s in which no force changes by more than this [N], and no joint by more than that [rad]
+REST = 0.1, 0.02, 1e-5  # s in which no force changes by more than this [N], no joint and no hand by that [rad, m]
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
     forces, depths = [0.0] * parts, [0.0] * parts
     starts = run.plant.places
     stood = False
-    seen = [0.0, *forces, *case.start]  # when, the forces then, and where the joints were
+    seen = [0.0]  # when, the forces then, and where joints and hands were
 
     def program(_: object) -> tuple[Joints, float] | None:
         return (case.qd, RUN_UP_ACCELERATION) if any(case.qd) else None
@@ -222,12 +222,13 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
             for contact in mine:
                 gave = 0.0 if run.plant.parts[part].acts else dot(minus(place, began), contact.normal)
                 depths[part] = max(depths[part], contact.depth + gave)
-        since, (period, newtons, radians) = run.now - run.meter.began, REST
+        since, (period, newtons, length) = run.now - run.meter.began, REST
         if not run.latched or since < AT_REST or since - seen[0] < period:
             return run.latched and since > SETTLED
-        before, seen = seen, [since, *now, *run.plant.q]
-        most = [newtons] * parts + [radians] * len(run.plant.q)
-        return all(abs(a - b) < c for a, b, c in zip(seen[1:], before[1:], most, strict=True))
+        before, where = seen, [*run.plant.q, *(x for place in run.plant.places for x in place)]
+        seen = [since, *now, *where]
+        most = [newtons] * parts + [length] * len(where)
+        return len(before) > 1 and all(abs(a - b) < c for a, b, c in zip(seen[1:], before[1:], most, strict=True))
 
     run.run(program, longest=LONGEST, after=LONGEST, look=look)
     moved = run.event(EventName.RETREATED)

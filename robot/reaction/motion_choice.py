@@ -20,8 +20,8 @@ from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
 _MIN_SPEED = 1e-3  # m/s; slower counts as standing
 _PUSH_DAMPING = 1500.0  # N s/m; between a push that the joints feel and the speed at which it is followed
-_MAX_CARRIED = 15.0  # N that something else may take off a push whose touch does not become lighter, or _CARRIED_SHARE
-_CARRIED_SHARE = 0.5  # of the push; as much less than that does not show in the level of a firm touch
+_MAX_CARRIED = 15.0  # N that something else may take off a push whose touch does not become lighter
+_FOLLOWED_SHARE = 0.5  # of a firm push that is followed, while nothing takes anything off it
 _LIGHTER = 0.01  # of the level; six times its noise
 
 
@@ -34,7 +34,7 @@ class _AdmittanceMotion:
     The joints have to feel the push as well: with the force F that drives the arm along its motion, t . qd / v with the
     torque t from outside, v is at most F / _PUSH_DAMPING. What presses against the arm behind, where a skin is or not,
     takes that force away. So the arm comes to rest where both are equal, and presses no harder than it is pushed. Where
-    the touch has not become lighter meanwhile, it rests as soon as half of the push is gone, or 15 N.
+    the touch has not become lighter meanwhile, it rests as soon as 15 N of the push are gone.
 
     Point and normal are taken anew in each cycle, where the touch is then. Where that is not known, or where touches
     push against each other, the arm stands. Each cycle is one step of a retreat (``retreat``) from where the arm is, so
@@ -123,7 +123,9 @@ class _AdmittanceMotion:
         strongest, then = self._strongest
         if driven >= strongest or level < then - _LIGHTER:
             self._strongest = strongest, then = driven, level
-        return driven - max(0.0, strongest - max(_MAX_CARRIED, _CARRIED_SHARE * strongest))
+        if strongest <= _MAX_CARRIED:
+            return driven
+        return (1.0 - (strongest - driven) / _MAX_CARRIED) * max(_MAX_CARRIED, _FOLLOWED_SHARE * strongest)
 
 
 def _wanted_speed(reaction: Reaction, contacts: Sequence[ContactOnLink]) -> float:
