@@ -100,14 +100,24 @@ class BoardCircuit(NamedTuple):
         for component in [*self.components, Component("W1", "cable", "", "", {})]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
-        rows.writerow(("count", "names", "what", "value", "number", "second source", "EUR", "data sheet"))
-        rows.writerow((1, "A1", self.facts.title, "", "", "", "", ""))
+        columns = (
+            "count",
+            "names",
+            "what",
+            "value",
+            "number",
+            "second source",
+            "EUR",
+            "data sheet",
+            "limits not sourced",
+        )
+        rows.writerow(columns)
+        own = unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
+        rows.writerow((1, "A1", self.facts.title, *[""] * 5, own))
         for (part, value), names in alike.items():
             row = catalog[part]
-            price = f"{len(names) * row['price']:.1f}"
-            rows.writerow(
-                (len(names), " ".join(names), row["what"], value, row["number"], row["second"], price, row["source"])
-            )
+            told = row["what"], value, row["number"], row["second"], f"{len(names) * row['price']:.1f}", row["source"]
+            rows.writerow((len(names), " ".join(names), *told, unsourced_limits(row)))
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
@@ -241,6 +251,11 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
 def part_catalog() -> dict[str, Any]:
     """Return the tables of parts.toml by name."""
     return tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
+
+
+def unsourced_limits(row: Mapping[str, Any]) -> str:
+    """Return the limits in a table of parts.toml that no document was found for, by their names."""
+    return " ".join(name for name, where in row.get("sources", {}).items() if "not sourced" in where)
 
 
 def switch_for(sensor: Sensor) -> tuple[str, dict[str, list[float]]]:

@@ -45,7 +45,7 @@ def board_page(circuit: BoardCircuit) -> str:
         "|---|---|",
         "| no sensor, no board in its socket: 5V, 3V3 to GND | more than 1 kohm, either way |",
         "| the board by itself, over USB | flashed as below, and only then put into its socket |",
-        f"| powered, no sensor: RAIL | {parts.supply_volts:g} V, 2 % |",
+        f"| powered, no sensor: RAIL | {parts.supply_volts:g} V, 3 % |",
         f"| BIAS, AMP | {bias * 1e3:.0f} mV both, within 5 mV |",
         f"| no sensor: `coneskin monitor /dev/ttyACM0 --baud {board.baud} --json` | frames; the drive currents "
         "within 2 counts of the zero |",

@@ -68,7 +68,15 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
     assert parts.pop("A1")["what"] == BOARD_FACTS[board].title
     assert all(row["number"] and row["second source"] and row["data sheet"] for row in parts.values())
     assert [row["count"] for row in parts.values() if row["value"] == "100 kohm"] == ["8"]
+    assert parts["U2"]["limits not sourced"] == "offset_uv gain_percent bandwidth_hz"
+    assert all(row["limits not sourced"] == "" for row in parts.values() if "TNPW" in row["number"])
     assert str(folder / "board.md") in capsys.readouterr().out
+
+
+def test_every_limit_says_where_it_stands():
+    catalog = part_catalog()
+    assert {name for name, row in catalog.items() if {*row["limits"]} != {*row.get("sources", {})}} == set()
+    assert {*BOARD_FACTS} - {*catalog} == {"esp32"}
 
 
 @each_board
