@@ -51,15 +51,15 @@ def off_normals(plant: FlatPlant, phi: np.ndarray, patches: tuple[PressedPatch, 
     return np.arccos(np.clip(part + (1.0 - part) * np.cos(turns), -1.0, 1.0))
 
 
-def measure(plants: SolvedPlants, count: int, electric: str) -> list[Several]:
-    """Measure so many presses, of every kind on every sensor in turn."""
+def measure(plants: SolvedPlants, count: int, electric: str, first: int = 0) -> list[Several]:
+    """Measure so many presses, of every kind on every sensor in turn, from a number on."""
     rng = np.random.default_rng(5)
     found = {k: Several(k, 0, 0, 0, 0, 0, []) for k in SEVERAL_KINDS}
     learned = {}
     for name, plant in SHEETS.items():
         circuit = electronics(name)[electric]
         learned[name] = circuit, circuit.counts(circuit.exact(plants.admittance(plant, ())), LEARNED_FRAMES, rng)
-    cases = list(islice(several_cases(count), count))
+    cases = list(islice(several_cases(first + count), first, None))
     for start in range(0, count, _AT_ONCE):
         part = cases[start : start + _AT_ONCE]
         by_sheet: dict[str, list[int]] = {}
@@ -70,7 +70,7 @@ def measure(plants: SolvedPlants, count: int, electric: str) -> list[Several]:
             exact = np.array([circuit.exact(plants.of(part[n])) for n in numbers])
             answer = decode(Sitting(SHEETS[name], circuit, untouched, circuit.counts(exact, PRESS_FRAMES, rng)))
             for row, n in enumerate(numbers):
-                _count(found[part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, start + n)
+                _count(found[part[n].kind], part[n], {k: v[row] for k, v in answer.items()}, first + start + n)
     return list(found.values())
 
 
