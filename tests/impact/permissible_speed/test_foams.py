@@ -2,15 +2,16 @@ from __future__ import annotations
 
 import math
 import random
+from collections.abc import Callable
 
 import pytest
 
 from coneskin.impact.permissible_speed.limits_file import ForceLimits
-from coneskin.impact.permissible_speed.speed_map import permissible_speed, softest
+from coneskin.impact.permissible_speed.speed_map import speed_within_spread
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
-from tests.support.foams import KINDS, judge, off, random_case, random_foam
+from tests.support.foams import CLOSING_FORCE, KINDS, judge, off, random_case, random_foam
 from tests.support.stored_energy import stored_energy
 
 TABLE = ((1e-3, 10.0), (2e-3, 18.0), (3e-3, 36.0), (4e-3, 70.0))
@@ -41,15 +42,16 @@ def test_a_blow_is_as_deep_as_the_energy_under_the_table_says() -> None:
 def test_the_worst_foam_is_the_softest_pressed_as_the_stiffest() -> None:
     """A slow mass on a wall: within the spread, its energy is least taken up by the softest."""
     padding = Padding(table=TABLE, loss=0.0, spread=0.2)
-    soft, limits = softest(padding, ForceLimits(60.0, 30.0))
-    assert soft.table == tuple((s, pytest.approx(0.8 * f)) for s, f in TABLE)
-    assert (limits.transient, limits.lasting) == (pytest.approx(40.0), pytest.approx(20.0))
-    free = ForceLimits(60.0, math.inf)
-    soft, limits = softest(padding, free)
-    wall = StruckBody(math.inf)
-    found = permissible_speed(lambda v: [TwoMassContact(DrivenArm(v, 5.0), wall, soft)], limits)
-    depth = 3e-3 + 1e-3 * (50.0 - 36.0) / 34.0  # where 1.2 times the table has 60 N
-    assert found == pytest.approx(math.sqrt(2.0 * 0.8 * stored_energy(padding, depth) / 5.0), rel=5e-3)
+    wall, depth = StruckBody(math.inf), 3e-3 + 1e-3 * (50.0 - 36.0) / 34.0  # where 1.2 times the table has 60 N
+
+    def found(arm: Callable[[float], DrivenArm], limits: ForceLimits) -> float:
+        return speed_within_spread(lambda v, foam: [TwoMassContact(arm(v), wall, foam)], padding, limits)
+
+    free = found(lambda v: DrivenArm(v, 5.0), ForceLimits(60.0, math.inf))
+    assert free == pytest.approx(math.sqrt(2.0 * 0.8 * stored_energy(padding, depth) / 5.0), rel=5e-3)
+    stopped = found(lambda v: DrivenArm(v, reaction=0.0), ForceLimits(math.inf, 60.0))  # it goes v^2 / 2 a further
+    closes = next(s * CLOSING_FORCE / (0.8 * f) for s, f in TABLE)
+    assert stopped == pytest.approx(math.sqrt(2.0 * (depth - closes)), rel=5e-3)
 
 
 @pytest.mark.long
@@ -58,8 +60,7 @@ def test_no_foam_within_its_spread_presses_more_than_the_limits(kind: str) -> No
     chance = random.Random(kind)
     for _ in range(6):
         foam, region, at = random_case(chance)
-        soft, limits = softest(foam, region.limits)
-        speed = permissible_speed(lambda v, at=at, soft=soft: [at(v, soft)], limits)  # type: ignore[misc]
+        speed = speed_within_spread(lambda v, padding, at=at: [at(v, padding)], foam, region.limits)  # type: ignore[misc]
         contact = at(speed, foam)
         deepest = judge(contact, off(foam, "softer", chance, 1.0), foam.loss)[2]
         peak, lasting, _ = judge(contact, off(foam, kind, chance, deepest), foam.loss)

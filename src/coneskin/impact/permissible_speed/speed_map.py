@@ -14,7 +14,7 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,16 +54,6 @@ def _keeps(model: TwoMassContact, limits: ForceLimits) -> bool:
     return course.peak <= limits.transient and max(course.last, course.rest) <= limits.lasting
 
 
-def softest(padding: Padding, limits: ForceLimits) -> tuple[Padding, ForceLimits]:
-    """Return the softest padding within the spread of one, and the limits with which it keeps those of all of them.
-
-    It is pressed the deepest; there, the force of another is at most (1 + spread) / (1 - spread) times its.
-    """
-    low = 1.0 - padding.spread
-    share = low / (1.0 + padding.spread)
-    return padding.scaled(low), ForceLimits(share * limits.transient, share * limits.lasting)
-
-
 def permissible_speed(
     at_speed: Callable[[float], Sequence[TwoMassContact]],
     limits: ForceLimits,
@@ -98,6 +88,35 @@ def permissible_speed(
         else:
             high = middle
     return low
+
+
+def speed_within_spread(
+    at_speed: Callable[[float, Padding], Sequence[TwoMassContact]],
+    padding: Padding,
+    limits: ForceLimits,
+    least: float = _LEAST_SPEED,
+    top: float = _TOP_SPEED,
+) -> float:
+    """Return the highest speed up to which contacts keep limits with each padding within the spread of one [m/s].
+
+    The softest is pressed the deepest; there, the force of another is at most (1 + spread) / (1 - spread) times its.
+    A body that swings may meet another padding harder all the same, or a contact beside the first: what is found with
+    the softest and the first is looked at with all contacts, and with the padding of the table and the stiffest.
+
+    Args:
+        at_speed: makes the contacts at a speed [m/s] with a padding, all of which must keep them.
+        padding: as its table says.
+        limits: to be kept.
+        least, top: as of `permissible_speed`.
+    """
+    low, high = 1.0 - padding.spread, 1.0 + padding.spread
+    tight = ForceLimits(low / high * limits.transient, low / high * limits.lasting)
+    soft = padding.scaled(low)
+    found = permissible_speed(lambda speed: at_speed(speed, soft)[:1], tight, least, top)
+    for foam, kept in ((soft, tight), (padding, limits), (padding.scaled(high), limits)):
+        if found > 0.0 and not all(_keeps(contact, kept) for contact in at_speed(found, foam)):
+            found = permissible_speed(lambda speed, foam=foam: at_speed(speed, foam), kept, least, found)  # type: ignore[misc]
+    return found
 
 
 #: m/rad; a UR20 reaches 1.75 m
@@ -275,9 +294,6 @@ def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) ->
     return ExtraWay(_SAMPLING_FACTOR * lag, _SAMPLING_FACTOR * bend)
 
 
-_Contacts = list[TwoMassContact]
-
-
 class _CurveMaker:
     """Maker of curves, each of them once."""
 
@@ -310,27 +326,16 @@ class _CurveMaker:
         self._note(f"{region.name} struck by {mass:g} kg")
         speeds: list[float] = []
         measured = replace(self._limits.measured, deceleration=braking)
-        padding, limits = softest(self._padding, region.limits)
         for number, lever in enumerate(LEVERS):
 
-            def contacts(
-                speed: float, lever: float = lever, ways: Sequence[ExtraWay] = (extra,), foam: Padding = padding
-            ) -> _Contacts:
-                common = region, measured, foam
-                return [contact_at(speed, lever, mass, *common, way) for way in ways]
+            def contacts(speed: float, padding: Padding, lever: float = lever) -> list[TwoMassContact]:
+                common = region, measured, padding  # a body that swings may meet a shorter way harder
+                return [contact_at(speed, lever, mass, *common, way) for way in (extra, _NO_WAY)]
 
             least, top = _LEAST_SPEED, _TOP_SPEED
             if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
                 least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
-            found = permissible_speed(contacts, limits, least, top)
-            both = partial(contacts, ways=(extra, _NO_WAY))  # a body that swings may meet a shorter way harder
-            if found > 0.0 and not all(_keeps(contact, limits) for contact in both(found)):
-                found = permissible_speed(both, limits, least, top)
-            for share in (1.0, 1.0 + padding.spread):  # and one that swings, another foam
-                others = partial(contacts, ways=(extra, _NO_WAY), foam=self._padding.scaled(share))
-                if found > 0.0 and not all(_keeps(contact, region.limits) for contact in others(found)):
-                    found = permissible_speed(others, region.limits, least, found)
-            speeds.append(found)
+            speeds.append(speed_within_spread(contacts, self._padding, region.limits, least, top))
         for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
             speeds[number] = min(speeds[number], speeds[number + 1])
         return tuple(speeds)
