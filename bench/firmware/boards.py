@@ -18,7 +18,7 @@ from tests.support.firmware.board_population import Verdict, judge
 
 OFFERED = (
     *(("uno", "built-in"), ("nano-every", "built-in"), ("pico", "built-in"), ("teensy", "built-in")),
-    *(("esp32", "ads1115"), ("uno", "ads1115"), ("uno", "ads1015")),
+    *(("esp32", "ads1115"), ("uno", "ads1115"), ("uno", "ads1015"), ("uno", "ltc1867")),
 )
 
 

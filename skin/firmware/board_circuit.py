@@ -26,6 +26,8 @@ _EXTRA_BITS = 1  # that the sketch's usual setting adds to the converter's: two 
 _BIAS_SHARE = 127.0 / 10127.0  # of 3.3 V, at the amplifier's reference pin
 _INPUT_OHMS = 470e3  # 25 nA of warm clamps and switches lift a guide that floats by 12 mV; over 10 Mohm by 250 mV
 PIN_OHMS = 30.0  #: of a controller's pin that holds a pull-down at ground, 25 to 40
+_USUAL_SILENCE_MS = 50  # what a scene allows by default
+_SPI_PINS = {"10": "CS", "11": "MOSI", "12": "MISO", "13": "SCK"}  # of an Uno or Nano
 _FIXED_VOLTS = 2.5  # of the cheap regulator
 _LEAST_CHIP_SHUNT = 10.0  # ohm; below, a shunt is a part of its own
 WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
@@ -80,8 +82,8 @@ class BoardCircuit(NamedTuple):
         """What the scene's table of limits has to say of this board; empty where nothing."""
         found: dict[str, float | int] = {}
         if self.converter is not None:
-            silence = 4000 // self.converter.rate_hz  # [ms], four frames
-            found |= {"skin_silence_ms": silence, "skin_late_ms": silence}
+            if (silence := 4000 // self.converter.rate_hz) >= _USUAL_SILENCE_MS:  # four frames
+                found |= {"skin_silence_ms": silence, "skin_late_ms": silence}
             if self.converter.bits < _QUIET_BITS:
                 found["stuck_frames"] = 0
         if self.facts.clock_ppm > 100:
@@ -145,7 +147,7 @@ class BoardCircuit(NamedTuple):
         if facts.logic_volts > 3.3 and self.converter is None:
             found["AREF"] = "3V3"
         if self.converter is not None:
-            found |= {"SDA": "SDA", "SCL": "SCL"}
+            found |= _SPI_PINS if self.converter.pull_down else {"SDA": "SDA", "SCL": "SCL"}
         elif board.common:
             found |= {board.common: "MUX", **{pin: f"MUX_{k}" for k, pin in enumerate(board.select)}}
         else:
@@ -219,8 +221,16 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
         if converter not in known:
             raise SensorError(f"converter must be one of {', '.join([BUILT_IN, *known])}, got {converter!r}")
         other = known[converter]
+        if other.pull_down and facts.logic_volts < 5.0:
+            raise SensorError(
+                f"an {other.name.upper()} answers with 5 V, and the pins of a {facts.title} have "
+                f"{facts.logic_volts:g} V: take another board, or another converter"
+            )
         *electrodes, current, rail = other.channels
-        board = board._replace(sense=tuple(electrodes), current=current, supply=rail, select=(), common="")
+        down = other.pull_down or board.pull_down
+        board = board._replace(
+            sense=tuple(electrodes), current=current, supply=rail, select=(), common="", pull_down=down
+        )
         bits, volts = other.bits + other.extra_bits, other.volts
     ampere = 1.0 / (SENSE_GAIN * shunt)  # A for a volt
     lead, resistor = _WIRE_OHMS + limits["on_ohm"][0], sensor.electronics.pulldown_ohms
@@ -318,7 +328,13 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
             yield two("R", "precise", ohms_text(circuit.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
     group = "converter"
     inputs = [f"ADC_{name}" for name in "ABCDIS"]
-    if converter is not None:
+    if converter is not None and converter.pull_down:
+        channels = {f"CH{k}": net for k, net in enumerate(inputs)} | {"CH6": "GND", "CH7/COM": "GND"}
+        lines = {"SDI": "MOSI", "SDO": "MISO", "SCK": "SCK", "CS/CONV": "CS", "VREF": "VREF", "REFCOMP": "REFCOMP"}
+        yield part("U", converter.name, **channels, **lines, VDD="5V", GND="GND")
+        for net, value in (("5V", "100 nF"), ("VREF", "2.2 uF"), ("REFCOMP", "10 uF")):
+            yield two("C", "decoupling", value, net, "GND")
+    elif converter is not None:
         supply = "5V" if circuit.facts.logic_volts > 3.3 else "3V3"
         for address, nets in (("GND", inputs[:4]), (supply, inputs[4:])):
             channels = {f"AIN{k}": net for k, net in enumerate(nets)}

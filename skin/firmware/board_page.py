@@ -15,7 +15,7 @@ def board_page(circuit: BoardCircuit) -> str:
     zero, bias = parts.count_amperes(0.0), 50.0 * parts.current_zero * circuit.shunt_ohms
     rate, remark = facts.rate, f"{facts.remark[:1].upper()}{facts.remark[1:]}. "
     if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
-        chips = f"two {other.name.upper()} in place of its converter"
+        chips = f"{'an' if other.pull_down else 'two'} {other.name.upper()} in place of its converter"
         rate, remark = f"{other.rate_hz}, measured in emulation on an Uno, with {chips}", ""
     lines = [
         f"# {facts.title} for {sensor.name}",

@@ -46,8 +46,8 @@ BOARD_FACTS: dict[str, BoardFacts] = {
 
 
 _BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
-_CONVERTER_PATTERN = re.compile(r'^const Converter CONVERTER = \{"(ads\d+)", (.*)\};$', re.MULTILINE)
-_CONVERTER_CHOICE = "#define CONESKIN_ADS "
+_CONVERTER_PATTERN = re.compile(r'^const Converter CONVERTER = \{"([a-z]+\d+)", (.*)\};$', re.MULTILINE)
+_CONVERTER_CHOICE = "#define CONESKIN_CONVERTER "
 _HEADER_PATH = Path("coneskin") / "coneskin_board.h"
 _WORD_PATTERN = re.compile(r'"([^"]*)"|\{([^{}]*)\}|([^,{}\s]+)')
 _NO_PIN = "NONE"
@@ -78,11 +78,14 @@ class Converter(NamedTuple):
     extra_bits: int  #: that the sketch's usual setting adds
     rate_hz: int  #: frames per second of the usual setting
     permille: int  #: of the range that the sketch takes for the rail
+    pull_down: tuple[
+        str, ...
+    ]  #: pins in place of the board's, by a converter on SPI, which answers with 5 V; else none
 
     @property
     def channels(self) -> tuple[str, ...]:
         """Inputs of its chips for the electrodes A, B, C, D, the current and the rail."""
-        return tuple(f"0x{0x48 + n // 4:x} AIN{n % 4}" for n in range(6))
+        return tuple(f"CH{n}" if self.pull_down else f"0x{0x48 + n // 4:x} AIN{n % 4}" for n in range(6))
 
 
 #: name of a board's own converter
@@ -105,15 +108,17 @@ def converters() -> dict[str, Converter]:
     text = (firmware_folder() / _HEADER_PATH).read_text(encoding="utf-8")
     found = {}
     for name, row in _CONVERTER_PATTERN.findall(text):
-        bits, millivolts, _, _, _, extra_bits, _, rate, permille, _ = (w[1] or w[2] for w in _WORD_PATTERN.findall(row))
-        found[name] = Converter(name, int(bits), 1e-3 * int(millivolts), int(extra_bits), int(rate), int(permille))
+        words = (w[1] or w[2] for w in _WORD_PATTERN.findall(row))
+        bits, millivolts, _, _, _, extra, _, rate, permille, _, pull_down = words
+        numbers = int(bits), 1e-3 * int(millivolts), int(extra), int(rate), int(permille)
+        found[name] = Converter(name, *numbers, _pins(pull_down))
     return found
 
 
 def board_header(converter: str = BUILT_IN) -> bytes:
     """Return the sketch's header with the tables, set to a converter."""
     data = (firmware_folder() / _HEADER_PATH).read_bytes()
-    number = converter.removeprefix("ads") if converter != BUILT_IN else "0"
+    number = re.sub(r"\D", "", converter) or "0"
     return data.replace(f"{_CONVERTER_CHOICE}0\n".encode(), f"{_CONVERTER_CHOICE}{number}\n".encode())
 
 

@@ -123,7 +123,7 @@ def compile_for(folder, defines, header, declarations):
 )
 def test_the_sketch_compiles_for_it(tmp_path, target, ads):
     defines, *rest = TARGETS[target]
-    done = compile_for(tmp_path, f"{defines} -DCONESKIN_ADS={ads}", *rest)
+    done = compile_for(tmp_path, f"{defines} -DCONESKIN_CONVERTER={ads}", *rest)
     assert done.returncode == 0, done.stderr
 
 

@@ -49,7 +49,7 @@ struct Stored {
 };
 
 uint16_t crc_of(const Stored &stored) {
-  return coneskin_crc((const uint8_t *)stored.settings, sizeof stored.settings) ^ (VERSION + 1 + CONESKIN_ADS);  // never that of zeros
+  return coneskin_crc((const uint8_t *)stored.settings, sizeof stored.settings) ^ (VERSION + 1 + CONESKIN_CONVERTER);  // never that of zeros
 }
 
 void load_settings() {
@@ -74,13 +74,15 @@ void save_settings() {
 enum Electrode : uint8_t { A, B, C, D };
 enum Drive : uint8_t { FREE, RAIL, GROUND, PULL_DOWN };
 
+uint8_t pull_down_pin(uint8_t k) { return CONVERTER.pull_down[k] == NONE ? BOARD.pull_down[k] : CONVERTER.pull_down[k]; }
+
 void drive(Electrode electrode, Drive how) {
   static uint8_t now[4] = {FREE, FREE, FREE, FREE};
   if (now[electrode] == how) return;  // switching takes 10 us on a slow board
   now[electrode] = how;
   if (how != RAIL) digitalWrite(BOARD.rail[electrode], LOW);
   if (how != GROUND) digitalWrite(BOARD.ground[electrode], LOW);
-  if (electrode >= C) pinMode(BOARD.pull_down[electrode - C], how == PULL_DOWN ? OUTPUT : INPUT);
+  if (electrode >= C) pinMode(pull_down_pin(electrode - C), how == PULL_DOWN ? OUTPUT : INPUT);
   if (how == RAIL) digitalWrite(BOARD.rail[electrode], HIGH);
   if (how == GROUND) digitalWrite(BOARD.ground[electrode], HIGH);
 }
@@ -157,7 +159,7 @@ void self_test() {
   const Drive where = half ? RAIL : GROUND;
   drive_all(where, where, where, where);
   delayMicroseconds(settings[SETTLE_US]);
-  const uint16_t tolerance = ((uint16_t(1) << CONVERTER.bits) - 1) / 50;
+  const uint16_t tolerance = ((uint32_t(1) << CONVERTER.bits) - 1) / 50;
   const uint16_t expected = half ? converter_read(CONVERTER.supply) : 0;
   const bool current = half && converter_read(CONVERTER.current) > 2 * tolerance;  // the amplifier's zero is above 0
   const uint8_t turn = frame.sequence / 2 % 4;
@@ -177,7 +179,7 @@ uint8_t status_bits(bool late) {
   if (self_test_failed) status |= CONESKIN_SELF_TEST;
   if (converter_failed) status |= CONESKIN_ADC;
   converter_failed = false;
-  const uint16_t expected = (uint32_t)full_count() * settings[SUPPLY_PERMILLE] / 1000;
+  const uint32_t expected = (uint32_t)full_count() * settings[SUPPLY_PERMILLE] / 1000;
   const uint8_t phases = frame.length == 36 ? 1 : 3;
   for (uint8_t k = 0; k < phases; k++) {
     const uint16_t supply = frame.counts[CONESKIN_TOUCH_SUPPLY + k];
@@ -274,7 +276,7 @@ void setup() {
     digitalWrite(BOARD.ground[k], LOW);
     pinMode(BOARD.ground[k], OUTPUT);
   }
-  for (uint8_t k = 0; k < 2; k++) digitalWrite(BOARD.pull_down[k], LOW);
+  for (uint8_t k = 0; k < 2; k++) digitalWrite(pull_down_pin(k), LOW);
   Serial.begin(BOARD.baud);
 #if defined(ARDUINO_ARCH_ESP32) || defined(ARDUINO_ARCH_RP2040)
   EEPROM.begin(sizeof(Stored));

@@ -12,9 +12,10 @@
 #pragma once
 #include <Arduino.h>
 
-// 0: the board's own converter. 1015 or 1115: two ADS1015 or ADS1115 on the board's I2C pins instead.
-#ifndef CONESKIN_ADS
-#define CONESKIN_ADS 0
+// 0: the board's own converter. 1015 or 1115: two ADS1015 or ADS1115 on the board's I2C pins instead. 1867: one LTC1867
+// on its SPI pins; it answers with 5 V.
+#ifndef CONESKIN_CONVERTER
+#define CONESKIN_CONVERTER 0
 #endif
 
 const uint8_t NONE = 255;
@@ -28,8 +29,11 @@ struct Board {
   uint8_t select[3], common;
 };
 
-#if defined(ARDUINO_ARCH_ESP32) && !CONESKIN_ADS
-#error "The ESP32's own converter is dead below 0.14 V and bent by per cents: set CONESKIN_ADS to 1115."
+#if defined(ARDUINO_ARCH_ESP32) && !CONESKIN_CONVERTER
+#error "The ESP32's own converter is dead below 0.14 V and bent by per cents: set CONESKIN_CONVERTER to 1115."
+#endif
+#if CONESKIN_CONVERTER == 1867 && !defined(ARDUINO_AVR_UNO) && !defined(ARDUINO_AVR_NANO) && !defined(ARDUINO_AVR_NANO_EVERY)
+#error "An LTC1867 answers with 5 V, which the pins of this board do not stand."
 #endif
 
 // clang-format off
@@ -55,18 +59,21 @@ struct Converter {
   uint8_t sense[4], current, supply;
   uint16_t extra_bits, frame_length, rate_hz, supply_permille;  // usual settings with it
   bool slow;            // the self-test reads one electrode a frame, not four
+  uint8_t pull_down[2];  // in place of the board's, where the converter is at those
 };
 
 // Channel n of an ADS1x15 is input n % 4 of the chip at address 0x48 + n / 4.
 // clang-format off
-#if CONESKIN_ADS == 0
-const Converter CONVERTER = {"built-in", BOARD.bits, 3300, {BOARD.sense[0], BOARD.sense[1], BOARD.sense[2], BOARD.sense[3]}, BOARD.current, BOARD.supply, 1, 52, 200, 758, false};
-#elif CONESKIN_ADS == 1015
-const Converter CONVERTER = {"ads1015", 11, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 80, 610, true};
-#elif CONESKIN_ADS == 1115
-const Converter CONVERTER = {"ads1115", 15, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 40, 610, true};
+#if CONESKIN_CONVERTER == 0
+const Converter CONVERTER = {"built-in", BOARD.bits, 3300, {BOARD.sense[0], BOARD.sense[1], BOARD.sense[2], BOARD.sense[3]}, BOARD.current, BOARD.supply, 1, 52, 200, 758, false, {NONE, NONE}};
+#elif CONESKIN_CONVERTER == 1015
+const Converter CONVERTER = {"ads1015", 11, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 80, 610, true, {NONE, NONE}};
+#elif CONESKIN_CONVERTER == 1115
+const Converter CONVERTER = {"ads1115", 15, 4096, {0, 1, 2, 3}, 4, 5, 0, 40, 40, 610, true, {NONE, NONE}};
+#elif CONESKIN_CONVERTER == 1867
+const Converter CONVERTER = {"ltc1867", 16, 4096, {0, 1, 2, 3}, 4, 5, 0, 52, 200, 610, false, {A0, A1}};
 #else
-#error "CONESKIN_ADS must be 0, 1015 or 1115."
+#error "CONESKIN_CONVERTER must be 0, 1015, 1115 or 1867."
 #endif
 // clang-format on
 
@@ -105,13 +112,42 @@ inline void watchdog_feed() {
 
 bool converter_failed;  // since the last frame
 
-#if CONESKIN_ADS
+#if CONESKIN_CONVERTER == 1867
+#include <SPI.h>
+
+const uint8_t SELECT_PIN = 10;  // CS/CONV: a conversion begins as it rises, and is read while it is low
+
+inline void converter_begin() {
+  digitalWrite(SELECT_PIN, HIGH);
+  pinMode(SELECT_PIN, OUTPUT);
+  SPI.begin();
+  SPI.beginTransaction(SPISettings(8000000, MSBFIRST, SPI_MODE0));
+}
+
+inline uint16_t ltc_transfer(uint16_t command) {
+  digitalWrite(SELECT_PIN, LOW);
+  return SPI.transfer16(command);
+}
+
+// One conversion of a channel: 0 to 2^bits - 1. The word is SD OS S1 S0 COM UNI SLP: against ground, odd channels by OS,
+// from 0 V. A chip that does not answer is found by the self-test and the supply.
+inline uint16_t converter_read(uint8_t channel) {
+  const uint16_t command = 0x8400 | uint16_t(channel & 1) << 14 | uint16_t(channel >> 1) << 12;
+  ltc_transfer(command);
+  delayMicroseconds(5);  // 1 kohm and 470 pF, from the channel before: 10 time constants
+  digitalWrite(SELECT_PIN, HIGH);
+  delayMicroseconds(4);  // the conversion takes 3.5 us at most
+  const uint16_t value = ltc_transfer(command);
+  digitalWrite(SELECT_PIN, HIGH);
+  return value;
+}
+#elif CONESKIN_CONVERTER
 #include <Wire.h>
 
 const uint16_t ADS_STARTS = 0x8000, ADS_DONE = 0x8000;  // the same bit, written and read
 // One conversion, +-4.096 V, at the highest rate, no comparator.
 const uint16_t ADS_CONFIG = ADS_STARTS | 4 << 12 | 1 << 9 | 1 << 8 | 7 << 5 | 3;
-const uint16_t ADS_US = CONESKIN_ADS == 1115 ? 1100 : 250;  // that a conversion takes at least
+const uint16_t ADS_US = CONESKIN_CONVERTER == 1115 ? 1100 : 250;  // that a conversion takes at least
 const uint16_t ADS_LONGEST_US = 3000;
 
 inline void converter_begin() {

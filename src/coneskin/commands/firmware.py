@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("sensor", type=Path, metavar="SENSOR", help="sensor.toml, as coneskin design writes it")
     add("--board", choices=list(boards()), default="uno", help="which board (default: %(default)s)")
-    help_text = "the board's own, or two ADS1x15 on its I2C pins (default: %(default)s)"
+    help_text = "the board's own, two ADS1x15 on its I2C pins, or an LTC1867 on SPI (default: %(default)s)"
     add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help=help_text)
     add("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
     add("--flash", metavar="PORT", help="compile the sketch and write it onto the board at this port")
@@ -125,12 +125,13 @@ def _flash(sketch: Path, circuit: BoardCircuit, port: str) -> None:
 
 def _compile_for_uno(sketch: Path, folder: Path) -> Path:
     """Compile a sketch for an Uno with Debian's Arduino core, into a folder; return the program, an ELF file."""
-    core, wire = _AVR_CORE / "cores/arduino", _AVR_CORE / "libraries/Wire/src"
-    places = (core, _AVR_CORE / "variants/standard", _AVR_CORE / "libraries/EEPROM/src", wire, sketch)
+    core = _AVR_CORE / "cores/arduino"
+    wire, spi, memory = (_AVR_CORE / f"libraries/{name}/src" for name in ("Wire", "SPI", "EEPROM"))
+    places = (core, _AVR_CORE / "variants/standard", memory, wire, spi, sketch)
     source, program = folder / "coneskin.cpp", folder / "coneskin.elf"
     source.write_bytes(b"#include <Arduino.h>\n" + (sketch / "coneskin.ino").read_bytes())
     files = [source, *(path for end in ("c", "cpp", "S") for path in sorted(core.glob(f"*.{end}")))]
-    files += [wire / "Wire.cpp", wire / "utility/twi.c"]
+    files += [wire / "Wire.cpp", wire / "utility/twi.c", spi / "SPI.cpp"]
     words = ["avr-gcc", *_AVR_OPTIONS, *(f"-I{place}" for place in places), *map(str, files), "-lm", "-o", str(program)]
     _run(words)
     return program

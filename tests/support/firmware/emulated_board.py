@@ -183,8 +183,9 @@ def _words(
     }
     uno = boards()["uno"]
     own = (*uno.sense, uno.current, uno.supply)
-    channels = list("012345") if numbers.get("ads") else [pin.removeprefix("A") for pin in own]
-    pins = ",".join([*uno.rail, *uno.ground, *uno.pull_down, *channels])
+    channels = list("012345") if numbers.get("chip") else [pin.removeprefix("A") for pin in own]
+    down = ("14", "15") if numbers.get("chip") == 1867 else uno.pull_down  # A0 and A1
+    pins = ",".join([*uno.rail, *uno.ground, *down, *channels])
     first = [str(programs.emulator), str(programs.firmware), port, trace, repr(seconds)]
     return [*first, f"pins={pins}", *(f"{name}={value!r}" for name, value in numbers.items())]
 

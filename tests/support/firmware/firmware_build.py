@@ -13,6 +13,7 @@ from coneskin.skin.firmware.boards import firmware_folder
 PACKAGES = "gcc libc6-dev gcc-avr avr-libc arduino-core-avr libsimavr-dev libelf-dev"
 _CORE = Path("/usr/share/arduino/hardware/arduino/avr")
 _WIRE = _CORE / "libraries/Wire/src"
+_SPI = _CORE / "libraries/SPI/src"
 _NEEDED = (_CORE / "cores/arduino/Arduino.h", Path("/usr/include/simavr/sim_avr.h"))
 _BOARD = ("-mmcu=atmega328p", "-DF_CPU=16000000L", "-DARDUINO=10819", "-DARDUINO_AVR_UNO", "-DARDUINO_ARCH_AVR")
 _SMALL = ("-Os", "-ffunction-sections", "-fdata-sections")
@@ -28,13 +29,13 @@ def missing_tools() -> str:
     return f"no {', '.join(missing)}: apt-get install {PACKAGES}" if missing else ""
 
 
-def build_sketch(folder: Path, sketch: Path | None = None, ads: int = 0) -> Path:
+def build_sketch(folder: Path, sketch: Path | None = None, chip: int = 0) -> Path:
     """Compile a sketch for an Uno with the whole Arduino core, as its IDE does.
 
     Args:
         folder: where the objects go; those of the core that are there already are taken.
         sketch: the .ino file; the product's by default. It finds the product's headers.
-        ads: 1015 or 1115 for an ADS1015 or ADS1115 in place of the board's own converter.
+        chip: 1015 or 1115 for an ADS1015 or ADS1115, 1867 for an LTC1867 in place of the board's own converter.
 
     Returns:
         the program, an ELF file.
@@ -44,7 +45,7 @@ def build_sketch(folder: Path, sketch: Path | None = None, ads: int = 0) -> Path
     """
     product = firmware_folder()
     sketch = sketch or product / "coneskin" / "coneskin.ino"
-    places = (_CORE / "cores/arduino", _CORE / "variants/standard", _CORE / "libraries/EEPROM/src", _WIRE)
+    places = (_CORE / "cores/arduino", _CORE / "variants/standard", _CORE / "libraries/EEPROM/src", _WIRE, _SPI)
     headers = [f"-I{place}" for place in (*places, product / "coneskin")]
     core = _CORE / "cores/arduino"
     jobs: list[tuple[str, tuple[str, ...], Path]] = [
@@ -52,9 +53,11 @@ def build_sketch(folder: Path, sketch: Path | None = None, ads: int = 0) -> Path
     ]
     jobs += [("avr-g++", (*_CPP, "-w"), path) for path in sorted(core.glob("*.cpp"))]
     jobs.append(("avr-gcc", ("-x", "assembler-with-cpp", "-w"), core / "wiring_pulse.S"))
-    if ads:
+    if chip == 1867:
+        jobs.append(("avr-g++", (*_CPP, "-w"), _SPI / "SPI.cpp"))
+    elif chip:
         jobs += [("avr-g++", (*_CPP, "-w"), _WIRE / "Wire.cpp"), ("avr-gcc", (*_C, "-w"), _WIRE / "utility/twi.c")]
-    strict = (f"-DCONESKIN_ADS={ads}", "-Wall", "-Wextra", "-Werror", "-x", "c++", "-include", "Arduino.h")
+    strict = (f"-DCONESKIN_CONVERTER={chip}", "-Wall", "-Wextra", "-Werror", "-x", "c++", "-include", "Arduino.h")
     jobs.append(("avr-g++", (*_CPP, *strict), sketch))
     objects = []
     for compiler, options, source in jobs:
@@ -62,7 +65,7 @@ def build_sketch(folder: Path, sketch: Path | None = None, ads: int = 0) -> Path
         if source != sketch and Path(objects[-1]).exists():  # the core, from an earlier sketch
             continue
         _run([compiler, "-c", *_BOARD, *options, *headers, str(source), "-o", objects[-1]])
-    program = folder / f"{sketch.stem}{ads or ''}.elf"
+    program = folder / f"{sketch.stem}{chip or ''}.elf"
     _run(["avr-gcc", "-Os", "-mmcu=atmega328p", "-Wl,--gc-sections", *objects, "-lm", "-o", str(program)])
     return program
 

@@ -5,7 +5,7 @@
    "-"; SECONDS is how long to run as fast as possible, or 0: in real time, until standard input ends. Standard input
    takes lines "AFTER COMMAND", AFTER in seconds from when the line is read (where SECONDS is given, all are read at
    the start): sheets Y11..Y44, supply V, power off, power on, hang, port CHARACTERS, port off, port on,
-   bus off, bus on: the I2C bus, on which two ADS1x15 answer where one is set ("ads=1115"). */
+   bus off, bus on: the bus of the chips that stand in for the controller's converter where one is set ("chip=1115"). */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdint.h>
@@ -23,8 +23,9 @@
 
 #include "board_circuit.h"
 #include "ads1x15.h"
+#include "ltc1867.h"
 
-enum { DDR_B = 0x24, PORT_B = 0x25, DDR_D = 0x2A, PORT_D = 0x2B }; /* of an ATmega328P */
+enum { DDR_B = 0x24, PORT_B = 0x25, DDR_C = 0x27, PORT_C = 0x28, DDR_D = 0x2A, PORT_D = 0x2B, SPCR = 0x4C, SPSR, SPDR, SELECT_BIT = 2 }; /* of an ATmega328P */
 static const double SLICE = 1e-3; /* s; a full-speed USB port hands bytes on about as often */
 static const double TICKS = 1e4;  /* units of the emulated converter in a volt: finer than its millivolts */
 
@@ -42,7 +43,8 @@ static FILE *trace;
 static double off_time;                     /* s without power: the controller's cycles stand still */
 static int powered = 1, linked = 1, port_full, pins[12], sense[4], current_channel = 4, supply_channel = 5;
 static Ads chips[2];
-static double ads_kind; /* 1015 or 1115: what stands in for the controller's own converter; 0: nothing */
+static Ltc ltc;
+static double chip_kind; /* 1015, 1115 or 1867: what stands in for the controller's own converter; 0: nothing */
 static int ads_linked = 1;
 static double reference = 3.3, sense_gain = 50.0, bias = 0.0, noise = 1.5e-3;
 static uint8_t sent[4096], received[4096];
@@ -61,23 +63,10 @@ static double gauss(void) {
 }
 
 static int pin_state(int pin) {
-  const int shift = pin < 8 ? pin : pin - 8;
-  const int out = avr->data[pin < 8 ? DDR_D : DDR_B] >> shift & 1, high = avr->data[pin < 8 ? PORT_D : PORT_B] >> shift & 1;
+  const int shift = pin < 8 ? pin : pin < 14 ? pin - 8 : pin - 14; /* 14 is A0 */
+  const int out = avr->data[pin < 8 ? DDR_D : pin < 14 ? DDR_B : DDR_C] >> shift & 1;
+  const int high = avr->data[pin < 8 ? PORT_D : pin < 14 ? PORT_B : PORT_C] >> shift & 1;
   return out ? (high ? PIN_HIGH : PIN_LOW) : high ? PIN_PULLED_UP : PIN_FREE;
-}
-
-static void follow_pins(void) {
-  static uint32_t before = 1;
-  const uint32_t after = avr->data[DDR_B] | avr->data[PORT_B] << 8 | avr->data[DDR_D] << 16 | (uint32_t)avr->data[PORT_D] << 24;
-  if (after == before) return;
-  before = after;
-  advance(&circuit, seconds());
-  for (int k = 0; k < 4; k++) {
-    circuit.closed[k] = pin_state(pins[k]) == PIN_HIGH; /* a resistor holds the gate of a switch low otherwise */
-    circuit.ground[k] = pin_state(pins[4 + k]) == PIN_HIGH;
-    if (k < 2) circuit.down[k] = pin_state(pins[8 + k]);
-  }
-  circuit.changed = 1;
 }
 
 static double channel_volts(const double *volts, int channel) {
@@ -86,6 +75,61 @@ static double channel_volts(const double *volts, int channel) {
   if (channel == supply_channel) return volts[RAIL_NODE];
   if (channel == current_channel) return bias + sense_gain * (circuit.supply - volts[RAIL_NODE]);
   return 0.0;
+}
+
+static void select_chip(void) {
+  double volts[NODES];
+  if (!(avr->data[PORT_B] >> SELECT_BIT & 1)) {
+    ltc_fall(&ltc, seconds());
+    return;
+  }
+  advance(&circuit, seconds());
+  if (circuit.changed) rewire(&circuit);
+  potentials(&circuit, volts);
+  ltc_rise(&ltc, seconds(), channel_volts(volts, ltc_input(&ltc)) + noise / 16.0 * gauss());
+}
+
+/* The SPI of the controller, in the place of simavr's, at which a byte takes 100 us whatever the clock. */
+static uint8_t spi_out, spi_in;
+
+static avr_cycle_count_t end_byte(avr_t *which, avr_cycle_count_t when, void *param) {
+  (void)when, (void)param;
+  spi_in = ads_linked ? ltc_byte(&ltc, spi_out) : 0;
+  which->data[SPSR] |= 0x80;
+  return 0;
+}
+
+static void begin_byte(avr_t *which, avr_io_addr_t address, uint8_t value, void *param) {
+  static const uint8_t dividers[] = {4, 16, 64, 128};
+  (void)address, (void)param;
+  spi_out = value;
+  which->data[SPSR] &= 0x7F;
+  avr_cycle_timer_register(which, 8u * dividers[which->data[SPCR] & 3] >> (which->data[SPSR] & 1), end_byte, NULL);
+}
+
+static uint8_t read_byte(avr_t *which, avr_io_addr_t address, void *param) {
+  (void)address, (void)param;
+  which->data[SPSR] &= 0x7F;
+  return spi_in;
+}
+
+static void follow_pins(void) {
+  static uint64_t before = 1;
+  const uint8_t *at = avr->data;
+  const uint32_t low = at[DDR_B] | at[PORT_B] << 8 | at[DDR_D] << 16 | (uint32_t)at[PORT_D] << 24;
+  const uint64_t after = (uint64_t)(at[DDR_C] | at[PORT_C] << 8) << 32 | low;
+  if (after == before) return;
+  const uint64_t changed = after ^ before;
+  before = after;
+  if (chip_kind == 1867.0 && changed >> (8 + SELECT_BIT) & 1) select_chip();
+  if (!(changed & ~((uint64_t)1 << (8 + SELECT_BIT)))) return;
+  advance(&circuit, seconds());
+  for (int k = 0; k < 4; k++) {
+    circuit.closed[k] = pin_state(pins[k]) == PIN_HIGH; /* a resistor holds the gate of a switch low otherwise */
+    circuit.ground[k] = pin_state(pins[4 + k]) == PIN_HIGH;
+    if (k < 2) circuit.down[k] = pin_state(pins[8 + k]);
+  }
+  circuit.changed = 1;
 }
 
 static void convert(struct avr_irq_t *irq, uint32_t value, void *param) {
@@ -137,8 +181,8 @@ static void use_bus(struct avr_irq_t *irq, uint32_t value, void *param) {
     if (seen.u.twi.msg & TWI_COND_WRITE) {
       if (ads_write(chip, seen.u.twi.data)) chip->began = seconds();
     } else if (seen.u.twi.msg & TWI_COND_READ) {
-      const double end = chip->began + ads_time((int)ads_kind);
-      if (chip->busy && seconds() >= end) ads_finish(chip, (int)ads_kind, read_channel_mean(4 * k + ads_input(chip), chip->began, end));
+      const double end = chip->began + ads_time((int)chip_kind);
+      if (chip->busy && seconds() >= end) ads_finish(chip, (int)chip_kind, read_channel_mean(4 * k + ads_input(chip), chip->began, end));
       answer = avr_twi_irq_msg(TWI_COND_READ, seen.u.twi.addr, ads_read(chip));
     }
     avr_raise_irq(bus_input, answer);
@@ -241,7 +285,7 @@ static void set(const char *word) {
     {"supply", &circuit.supply}, {"shunt", &circuit.shunt}, {"leads", &circuit.leads}, {"pin", &circuit.pin},
     {"switches", &circuit.switches}, {"pulldown", &circuit.pulldown}, {"input", &circuit.input},
     {"cable", &circuit.cable}, {"layers", &circuit.layers}, {"reference", &reference}, {"gain", &sense_gain},
-    {"noise", &noise}, {"bias", &bias}, {"ads", &ads_kind},
+    {"noise", &noise}, {"bias", &bias}, {"chip", &chip_kind},
   };
   for (size_t k = 0; equals && k < sizeof numbers / sizeof *numbers; k++)
     if (strlen(numbers[k].name) == length && !strncmp(word, numbers[k].name, length)) {
@@ -286,7 +330,10 @@ int main(int count, char **words) {
   converter = avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_ADC0);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_ADC_GETIRQ, ADC_IRQ_OUT_TRIGGER), convert, NULL);
   for (uint8_t k = 0; k < 2; k++) avr_extint_set_strict_lvl_trig(avr, k, 0); /* polling for it takes half of the time */
-  if (ads_kind > 0.0) {
+  if (chip_kind == 1867.0) {
+    avr->io[AVR_DATA_TO_IO(SPDR)].w.c = begin_byte;
+    avr->io[AVR_DATA_TO_IO(SPDR)].r.c = read_byte;
+  } else if (chip_kind > 0.0) {
     bus_input = avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_INPUT);
     avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_TWI_GETIRQ(0), TWI_IRQ_OUTPUT), use_bus, NULL);
   }
