@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from .signals.journal import EventName, Outputs, emit
 
@@ -38,6 +39,15 @@ class ActivationStep(Enum):
     WITHDRAW = "withdraw"  #: take that back: something stands against it after all
 
 
+class _Way(NamedTuple):
+    """How far a guard is on its way to being active."""
+
+    request: int | None = None  # number of the reset that is under way
+    free_since: float | None = None
+    released_at: float | None = None  # None while no release waits for its acknowledgement
+    disturbed: bool = False  # by a touch, however short
+
+
 class Activation:
     """State of a guard on its way to being active.
 
@@ -54,64 +64,57 @@ class Activation:
     def __init__(self, settle: float) -> None:
         self.number = 0
         self._settle = settle
-        self._free_since: float | None = None
-        self._released_at: float | None = None  # None while no release waits for its acknowledgement
-        self._reported_at: float | None = None
-        self._waiting_for: list[str] = []
-        self._request: int | None = None  # number of the reset that is under way
-        self._disturbed = False
+        self._way = _Way()
+        self._reported: tuple[float, list[str]] | None = None  # when, and what it waited for
 
     def disturb(self) -> None:
         """Note that a touch has begun, however short it is."""
-        self._disturbed = True
+        self._way = self._way._replace(disturbed=True)
 
     @property
     def resetting(self) -> bool:
         """True from a manual reset until it is accepted or refused."""
-        return self._request is not None
+        return self._way.request is not None
 
     def reset(self, now: float, request: int) -> None:
         """Note a manual reset at a time [s], with the number of the request."""
-        self._request, self._free_since, self._released_at, self._disturbed = request, now, None, False
+        self._way = _Way(request, now)
 
     def poll(self, now: float, blockers: list[str], out: Outputs) -> ActivationStep:
         """Return what is due at a host time [s].
 
         A first activation waits as long as there is a blocker, one line each. Any blocker refuses a reset.
         """
-        if self._disturbed:
-            blockers, self._disturbed = [*blockers, "it was touched meanwhile"], False
-        released = self._released_at is not None
-        if self._released_at is not None and now - self._released_at > _RELEASE_TIMEOUT:
+        request, free_since, released_at, disturbed = self._way
+        if disturbed:
+            blockers = [*blockers, "it was touched meanwhile"]
+        if released_at is not None and now - released_at > _RELEASE_TIMEOUT:
             blockers = [*blockers, f"the release was not acknowledged within {_RELEASE_TIMEOUT:g} s"]
         if blockers:
-            self._free_since = self._released_at = None
-            self._report(now, blockers, out)
-            return ActivationStep.WITHDRAW if released else ActivationStep.WAIT
-        if self._free_since is None:
-            self._free_since = now
-        if released or now - self._free_since < self._settle:
-            return ActivationStep.WAIT
-        self._released_at = now
-        self.number += 1
-        return ActivationStep.RELEASE
+            self._way = _Way()  # a blocker refuses a reset
+            self._report(now, request, blockers, out)
+            return ActivationStep.WAIT if released_at is None else ActivationStep.WITHDRAW
+        free_since = now if free_since is None else free_since
+        due = released_at is None and now - free_since >= self._settle
+        self._way = _Way(request, free_since, now if due else released_at)
+        self.number += due
+        return ActivationStep.RELEASE if due else ActivationStep.WAIT
 
     def acknowledged(self, number: int) -> bool:
         """Tell whether this is the number of the release that waits for its acknowledgement."""
-        return self._released_at is not None and number == self.number
+        return self._way.released_at is not None and number == self.number
 
     def end(self) -> int:
         """End the way to being active: the guard is. Return the number of the reset, 0 for the first one."""
-        request, self._request = self._request or 0, None
-        self._free_since = self._released_at = None
+        request, disturbed = self._way.request or 0, self._way.disturbed
+        self._way = _Way(disturbed=disturbed)
         return request
 
-    def _report(self, now: float, blockers: list[str], out: Outputs) -> None:
-        if self._request is not None:
-            emit(out, EventName.REFUSED, now, what="reset", request=self._request, reasons=blockers)
-            self._request = None
-        elif self._reported_at is None:
-            self._reported_at = now
-        elif blockers != self._waiting_for and now - self._reported_at >= _REPORT_PERIOD:
-            self._reported_at, self._waiting_for = now, blockers
+    def _report(self, now: float, request: int | None, blockers: list[str], out: Outputs) -> None:
+        if request is not None:
+            emit(out, EventName.REFUSED, now, what="reset", request=request, reasons=blockers)
+        elif self._reported is None:
+            self._reported = now, []
+        elif blockers != self._reported[1] and now - self._reported[0] >= _REPORT_PERIOD:
+            self._reported = now, blockers
             emit(out, EventName.WAITING, now, reasons=blockers)

@@ -244,10 +244,10 @@ class ArmSupervisor:
             self._planner.torque.feed(state, phase is Phase.ACTIVE and not self._touches.contacts)
         if state.stopped_by_safety or not state.powered:
             self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
-        elif self.state_age.stepped:
+        elif self.state_age.newest.stepped:
             self._bar("the controller's clock has stepped")
         if phase.brakes:
-            if self.state_age.fresh and self._stands(state, measured_at, out):
+            if self.state_age.newest.fresh and self._stands(state, measured_at, out):
                 self.speed_reduction.put_back(state.time, out)
                 self._decide(state, state.time + _PLACE_TIME, out)
         elif phase is Phase.RETREATING:

@@ -260,14 +260,14 @@ class GuardCore:
             return
         now = state.time
         arm.sample(state, out)
-        if (stepped := arm.state_age.stepped) and arm.phase is not Phase.STARTING:
+        if (stepped := arm.state_age.newest.stepped) and arm.phase is not Phase.STARTING:
             what = "the controller's clock has stepped"
             self._add_fault(now, f"{what} by {stepped:+.3f} s: do not set it while the arm is guarded", out, what)
         if state.stopped_by_safety and arm.phase.watched:
             self._add_fault(now, "the controller's own safety system has stopped the arm", out)
         elif not state.powered and arm.phase.watched:
             self._add_fault(now, "the arm is not powered any more, or its brakes are closed", out)
-        if ended := self._companions.program_ended(now, arm.state_age.measured_at, state.program_running):
+        if ended := self._companions.program_ended(now, arm.state_age.newest.measured_at, state.program_running):
             self._add_fault(now, ended, out)
         heartbeat = arm.heartbeat  # does the program end by itself where no packet reaches the controller?
         if heartbeat is None:

@@ -138,7 +138,7 @@ class StandstillHold:
                 self.stopping = self.failed = False
         if not self.stopping:
             return False
-        if now - max(self._began, self._age.fresh_at) >= _BLIND_TIMEOUT:
+        if now - max(self._began, self._age.newest.fresh_at) >= _BLIND_TIMEOUT:
             self.stopping, self.failed = False, True
             self._due = now + _REPEAT_PERIOD
             return True
@@ -158,7 +158,7 @@ class StandstillHold:
             self.append(UseStopPath(StopPath.PROGRAM, self._deceleration))
         now = self._clock()
         timeout = _CONNECT_TIMEOUT if self.reader is None else _BLIND_TIMEOUT
-        if now - max(self._age.fresh_at, self._opened) < timeout:
+        if now - max(self._age.newest.fresh_at, self._opened) < timeout:
             return
         self._close_reader()
         with suppress(ConeSkinError):  # the next look tries again
@@ -176,7 +176,7 @@ class StandstillHold:
             for payload in [] if self.reader is None else self.reader.read():
                 self._state = self._driver.decode_state(self._clock(), payload)
                 measured_at = self._age.feed(self._state)
-                if self._age.fresh:
+                if self._age.newest.fresh:
                     states.append((self._state, measured_at))
         except ConeSkinError:  # reported elsewhere; here only the stops are left, until it can be opened again
             self._close_reader()

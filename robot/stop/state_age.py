@@ -8,7 +8,7 @@ repeats itself, is silent. One whose clock is set, back or ahead, is not: its cl
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from coneskin.robot.driver.values import ControllerState
 
@@ -16,6 +16,28 @@ _OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of t
 _MAX_STEP_AHEAD: Final = 0.25  # s by which a state may gain on the host's clock; more is no queue that is read out
 _MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
 _LAG_TIME: Final = 0.02  # s for which they must be as late
+
+
+class StateStamp(NamedTuple):
+    """What the newest state of a controller shows, and those before it have shown.
+
+    Attributes:
+        controller_time: its own time [s].
+        fresh: it was a new one.
+        fresh_at: host time of the newest one that was [s].
+        measured_at: host time at which it was measured [s].
+        stepped: by how much the controller's clock had stepped before it, ahead or back [s]. 0 where not.
+        late_since: host time of the first state that came too late to move away by, and all since [s].
+        very_late_since: the same of those that came later than they may [s].
+    """
+
+    controller_time: float = -math.inf
+    fresh: bool = False
+    fresh_at: float = -math.inf
+    measured_at: float = -math.inf
+    stepped: float = 0.0
+    late_since: float = math.inf
+    very_late_since: float = math.inf
 
 
 class StateAge:
@@ -31,65 +53,56 @@ class StateAge:
         limit: longest age of the newest state [s].
 
     Attributes:
-        fresh: True where the newest state was a new one.
-        fresh_at: host time of the newest one that was [s].
-        measured_at: host time at which the newest state was measured [s].
-        stepped: by how much the controller's clock had stepped before that state, ahead or back [s]. 0 where not.
+        newest: what the newest state shows.
     """
 
     def __init__(self, limit: float) -> None:
-        self.fresh = False
-        self.measured_at = -math.inf
-        self.stepped = 0.0
+        self.newest = StateStamp()
         self._limit = limit
-        self._controller_time = -math.inf  # of the newest state
-        self._before = self._now = math.inf  # smallest differences of the clocks in the last window and in this one [s]
-        self._since = -math.inf  # controller's time at which this window began
-        self.fresh_at = -math.inf
-        self._late_since = self._very_late_since = math.inf  # host times of the first state that came so late
+        #: smallest differences of the clocks in the last window and in this one, controller's time at its begin [s]
+        self._window = math.inf, math.inf, -math.inf
 
     def feed(self, state: ControllerState) -> float:
         """Take a state that was just read, and return the host time at which it was measured [s], never a later one."""
-        host, controller, last = state.time, state.controller_time, self._controller_time
-        difference = host - controller
-        self.fresh, self.stepped = controller != last, 0.0
-        if controller < last:
-            self.stepped = controller - last
-        elif (gained := min(self._now, self._before) - difference) > _MAX_STEP_AHEAD and gained < math.inf:
-            self.stepped = gained
-        if self.stepped:
-            self._before = self._now = math.inf
-            self._since = controller
-        elif controller - self._since > _OFFSET_WINDOW:
-            self._before, self._now, self._since = self._now, math.inf, controller
-        self._controller_time = controller
-        if difference < self._now:
-            self._now = difference
-        smallest = self._now if self._now < self._before else self._before
-        self.measured_at = measured_at = min(controller + smallest, host)
-        if self.fresh:
-            self.fresh_at = host
-            lag = host - measured_at
-            self._late_since = min(self._late_since, host) if lag > _MAX_SUPERVISION_LAG else math.inf
-            self._very_late_since = min(self._very_late_since, host) if lag > self._limit else math.inf
+        host, controller, last = state.time, state.controller_time, self.newest
+        difference, stepped, fresh = host - controller, 0.0, controller != last.controller_time
+        before, now, since = self._window
+        if controller < last.controller_time:
+            stepped = controller - last.controller_time
+        elif (gained := min(now, before) - difference) > _MAX_STEP_AHEAD and gained < math.inf:
+            stepped = gained
+        if stepped:
+            before = now = math.inf
+            since = controller
+        elif controller - since > _OFFSET_WINDOW:
+            before, now, since = now, math.inf, controller
+        now = difference if difference < now else now
+        self._window = before, now, since
+        measured_at = min(controller + (now if now < before else before), host)
+        fresh_at, late, very_late = last.fresh_at, last.late_since, last.very_late_since
+        if fresh:
+            fresh_at, lag = host, host - measured_at
+            late = min(late, host) if lag > _MAX_SUPERVISION_LAG else math.inf
+            very_late = min(very_late, host) if lag > self._limit else math.inf
+        self.newest = StateStamp(controller, fresh, fresh_at, measured_at, stepped, late, very_late)
         return measured_at
 
     def silent(self, now: float, limit: float = 0.0) -> bool:
         """Tell whether the newest fresh state is too old at a host time [s], older than a limit that may be longer."""
-        return now - self.fresh_at > max(limit, self._limit)
+        return now - self.newest.fresh_at > max(limit, self._limit)
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
         if self.silent(now):
             return f"the controller has sent no state for {1e3 * self._limit:g} ms"
-        if now - self._very_late_since > self._limit:
+        if now - self.newest.very_late_since > self._limit:
             causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
             return f"the controller's states come more than {1e3 * self._limit:g} ms late: {causes}"
         return ""
 
     def stale(self, now: float) -> str:
         """Return why they cannot supervise a motion away at a host time [s]. Empty where they can."""
-        if now - self._late_since <= _LAG_TIME:
+        if now - self.newest.late_since <= _LAG_TIME:
             return ""
         limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"
         return f"the controller's states come more than {limit} late, too late to move away by"

@@ -77,9 +77,9 @@ def _older_clock(was: Any) -> Any:
     def feed(self: Any, state: Any) -> float:
         measured_at: float = was(self, state)
         latest = getattr(self, "latest", -math.inf)
-        self.stepped = 0.0
+        self.newest = self.newest._replace(stepped=0.0)
         if state.controller_time <= latest:
-            self.fresh_at = self.latest_at
+            self.newest = self.newest._replace(fresh_at=self.latest_at)
         else:
             self.latest, self.latest_at = state.controller_time, state.time
         return measured_at

@@ -272,7 +272,12 @@ class GuardWorld:
         arm, activation, moves = core._arm, core._activation, self.settings.reaction not in ("stop", "slow")
         assert arm is not None
         facts: list[object] = [core.phase, self.arm.speed > 0.01, self.arm.safety_bits, self.wrong.key()]
-        facts += [bool(core._faults), activation.resetting, activation._released_at is None, judge.waiting < math.inf]
+        facts += [
+            bool(core._faults),
+            activation.resetting,
+            activation._way.released_at is None,
+            judge.waiting < math.inf,
+        ]
         facts += [(detector.ready, detector.touched) for detector in core._stream.detectors]
         facts += [tuple(core._companions._silent), bool(arm.state_age.trouble(self.now)), arm.backup_ready]
         stop, slow = arm._stop, arm.speed_reduction
