@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.values import ControllerState, SetSpeedSlider
@@ -103,6 +104,23 @@ _SLIDER_MEMORY = 3.0 * _FALL_TIME  # s; an arm that obeys is then as slow as the
 _JOINT_MARGIN = 1.25  # of that speed
 
 
+class _Excess(NamedTuple):
+    """Motion that would be above the limit."""
+
+    since: float  # [s]
+    top: float  # highest ratio since
+    judged_at: float  # when it was judged last whether the speed falls [s]
+    ratio: float  # then
+
+
+class _Demand(NamedTuple):
+    """What motion since the slider was set would have needed."""
+
+    looked_at: float = math.inf  # [s]
+    moved: float = 0.0  # [s]
+    ratio: float = 0.0  # highest, at full slider
+
+
 class SpeedLimit:
     """Limit of one arm.
 
@@ -123,17 +141,11 @@ class SpeedLimit:
         self.setting = _SliderSetting()
         self._sliders: deque[tuple[float, float]] = deque()  # time, and where the slider is from then on
         self._before: deque[tuple[float, Joints]] = deque()
-        self._over_since: float | None = None
-        self._top = 0.0  # highest ratio since then
-        self._judged_at = -math.inf
-        self._ratio_then = 0.0  # when it was judged last whether the speed falls
+        self._excess: _Excess | None = None
+        self._demand = _Demand()
         self._asked: float | None = None  # rad/s of the leading joint, for which the program asks at full slider
         self._steady_since = math.inf
-        self._hold = _HOLD_TIME
-        self._raised = False  # since the slider went down last
-        self._looked_at = math.inf
-        self._moved = 0.0  # s of motion since the slider was set
-        self._demand = 0.0  # highest ratio at full slider in that time
+        self._hold = _HOLD_TIME, False  # s of motion until the slider may go up again, and whether it has
 
     def sample(self, state: ControllerState, slider: float | None, out: Outputs) -> str:
         """Take a measured state. Return why the arm must be stopped, empty where it must not.
@@ -148,35 +160,37 @@ class SpeedLimit:
         ahead = self._ahead(now, state)
         ratio, name = self._surfaces.ratio([q + _SLIDER_LEAD * v for q, v in zip(state.q, ahead, strict=True)], ahead)
         if ratio <= 1.0:
-            self._over_since = None
+            self._excess = None
             self._relax(now, ratio, state.speed, out)
             return ""
-        self._forget_demand()
+        self._demand = _Demand()
         if slider is None:
             return f"{name} moves at {ratio:.0%} of the permissible speed, and the speed slider is not known"
         if self._disobeys(now, state.qd):
             return f"{name} moves at {ratio:.0%} of the permissible speed, and faster than the speed slider allows"
-        if self._over_since is None:
-            self._over_since, self._top = now, ratio
+        if self._excess is None:
+            self._excess = _Excess(now, ratio, now, ratio)
             self._lower(now, slider, ratio, ahead, state.speed, name, out)
             return ""
-        self._top = max(self._top, ratio)
-        if now - self._judged_at >= _SLIDER_LEAD:
-            if ratio > _FALL_RATIO * self._ratio_then:  # it was not enough
+        since, top, judged_at, then = self._excess
+        top = max(top, ratio)
+        if now - judged_at >= _SLIDER_LEAD:
+            if ratio > _FALL_RATIO * then:  # it was not enough
                 self._lower(now, slider, ratio, ahead, state.speed, name, out)
-            self._judged_at, self._ratio_then = now, ratio
-        if now - self._over_since > _FALL_TIME:
+            judged_at, then = now, ratio
+        self._excess = _Excess(since, top, judged_at, then)
+        if now - since > _FALL_TIME:
             measured = self._surfaces.ratio(state.q, state.qd)[0]
-            falls = measured < _FALL_RATIO * self._top
-            if measured > _SPEED_TOLERANCE and (not falls or now - self._over_since > 3.0 * _FALL_TIME):
+            falls = measured < _FALL_RATIO * top
+            if measured > _SPEED_TOLERANCE and (not falls or now - since > 3.0 * _FALL_TIME):
                 return f"{name} moves at {measured:.0%} of the permissible speed, and the speed slider has no effect"
         return ""
 
     def forget(self) -> None:
         """Forget what was measured: the arm stood, and moves again."""
         self._before.clear()
-        self._forget_demand()
-        self._over_since = self._asked = None
+        self._demand = _Demand()
+        self._excess = self._asked = None
         self.setting.resume()
 
     def end(self, now: float, slider: float | None, out: Outputs) -> None:
@@ -200,8 +214,7 @@ class SpeedLimit:
         while len(sliders) > 1 and now - sliders[1][0] >= _SLIDER_MEMORY:
             sliders.popleft()
         if self.setting.feed(now, slider):  # a person wants it so: begin anew
-            self._hold, self._raised = _HOLD_TIME, False
-            self._forget_demand()
+            self._hold, self._demand = (_HOLD_TIME, False), _Demand()
         fraction, ceiling = self.setting.fraction, self.setting.ceiling
         if fraction is not None and fraction > ceiling:  # it crossed the person's setting on its way
             self._set(now, ceiling, slider, "", 0.0, out)
@@ -256,9 +269,6 @@ class SpeedLimit:
             abs(v) > _JOINT_MARGIN * top * most + _MIN_SPEED for v, most in zip(qd, self._joint_speed, strict=True)
         )
 
-    def _forget_demand(self) -> None:
-        self._looked_at, self._moved, self._demand = math.inf, 0.0, 0.0
-
     # ---- what is done
 
     def _lower(
@@ -271,34 +281,35 @@ class SpeedLimit:
         if top > _GROWTH_RATIO * speed:
             share *= top / max(top, (self._asked or self._fastest) * before)
         fraction = min(slider, max(_MIN_SLIDER, share * before))
-        if self._raised:
-            self._hold, self._raised = min(_MAX_HOLD_TIME, 2.0 * self._hold), False
+        hold, raised = self._hold
+        if raised:
+            self._hold = min(_MAX_HOLD_TIME, 2.0 * hold), False
         self._set(now, fraction, slider, name, ratio, out)
 
     def _relax(self, now: float, ratio: float, speed: float, out: Outputs) -> None:
         """Let the slider go up again after motion that would have allowed it. A standing arm says nothing."""
         setting = self.setting
-        if setting.fraction is None or not setting.shown:
-            self._forget_demand()
+        before, (looked_at, moved, demand), hold = setting.fraction, self._demand, self._hold[0]
+        if before is None or not setting.shown:
+            self._demand = _Demand()
             return
-        since, self._looked_at = max(0.0, now - self._looked_at), now
-        if speed < _MIN_SPEED:
+        if speed >= _MIN_SPEED:
+            moved += min(max(0.0, now - looked_at), _GROWTH_WINDOW)
+            demand = max(demand, ratio / max(_MIN_SLIDER, before))
+        self._demand = _Demand(now, moved, demand)
+        if speed < _MIN_SPEED or moved < hold:
             return
-        self._moved += min(since, _GROWTH_WINDOW)
-        self._demand = max(self._demand, ratio / max(_MIN_SLIDER, setting.fraction))
-        if self._moved < self._hold:
-            return
-        fraction = min(setting.ceiling, _SPEED_MARGIN / self._demand if self._demand > 0.0 else math.inf)
-        before = setting.fraction
-        self._forget_demand()
+        fraction = min(setting.ceiling, _SPEED_MARGIN / demand if demand > 0.0 else math.inf)
+        self._demand = _Demand()
         if fraction <= before or fraction < min(setting.ceiling, _STEP_UP * before):
             return
-        self._raised = True
+        self._hold = hold, True
         self._set(now, fraction, before, "", ratio, out)
 
     def _set(self, now: float, fraction: float, before: float, name: str, ratio: float, out: Outputs) -> None:
         self.setting.set(now, fraction, before)
-        self._judged_at, self._ratio_then = now, ratio
+        if self._excess is not None:
+            self._excess = self._excess._replace(judged_at=now, ratio=ratio)
         out.append(SetSpeedSlider(fraction))
         found = self.setting.ceiling
         emit(out, EventName.SPEED_LIMITED, now, slider=fraction, before=before, sensor=name, ratio=ratio, found=found)
