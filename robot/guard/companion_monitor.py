@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from coneskin.robot.driver.liveness import BEAT_PERIOD, HOLD_UP_LIMIT
 from coneskin.robot.driver.values import StopPath
@@ -42,6 +42,14 @@ _LOST_WITH_PROCESS: Mapping[str, frozenset[StopPath]] = {
 }
 
 
+class _DriverProgram(NamedTuple):
+    """Program of the driver process on the controller."""
+
+    ran: bool = False
+    end: float = math.inf  # by when it has to run again, after an announced end [s]
+    restarted_at: float = -math.inf  # [s]
+
+
 class CompanionMonitor:
     """Monitor of the processes beside one guard.
 
@@ -62,9 +70,7 @@ class CompanionMonitor:
         self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
         self._suspended = False  # the program, by the newest look
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
-        self._ran = False  # the driver's program, on the controller
-        self._restarted_at = -math.inf
-        self._restart_end = math.inf  # by when it has to run again, after an announced end
+        self._program = _DriverProgram()
 
     @property
     def blockers(self) -> Iterable[str]:
@@ -120,10 +126,11 @@ class CompanionMonitor:
         Nothing moves while it does not run. A start that is not reported in time counts as an end. To announce
         it again gives it no more time.
         """
-        self._restart_end = math.inf if over else min(self._restart_end, now + _RESTART_TIMEOUT)
-        self._ran = not over
+        _, end, restarted_at = self._program
         if over:
-            self._restarted_at = now
+            self._program = _DriverProgram(restarted_at=now)
+        else:
+            self._program = _DriverProgram(True, min(end, now + _RESTART_TIMEOUT), restarted_at)
 
     def program_ended(self, now: float, measured_at: float, running: bool) -> str:
         """Take whether a program runs on the controller, and return what is wrong. Empty where nothing is.
@@ -136,17 +143,19 @@ class CompanionMonitor:
             measured_at: host time at which it was measured [s].
             running: a program runs.
         """
-        if measured_at < self._restarted_at:
+        ran, end, restarted_at = self._program
+        if measured_at < restarted_at:
             return ""
         if self._arm is None or not self._arm.internal_control or not self._arm.phase.watched:
-            self._ran, self._restart_end = False, math.inf
-        elif running and now >= self._restart_end:  # it was refused, and the old one goes on
-            self._ran, self._restart_end = True, math.inf
-        elif running or now < self._restart_end < math.inf:
-            self._ran = True
-        elif self._ran:
-            self._ran, self._restart_end = False, math.inf
+            ran, end = False, math.inf
+        elif running and now >= end:  # it was refused, and the old one goes on
+            ran, end = True, math.inf
+        elif running or now < end < math.inf:
+            ran = True
+        elif ran:
+            self._program = _DriverProgram(restarted_at=restarted_at)
             return "the driver's program has ended on the controller: its process may hang"
+        self._program = _DriverProgram(ran, end, restarted_at)
         return ""
 
     def poll(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:

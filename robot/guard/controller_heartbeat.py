@@ -28,9 +28,7 @@ class ControllerHeartbeat:
     def __init__(self, required: bool) -> None:
         self.required = required
         self._echo = 0
-        self._running = False
-        self._began: float | None = None  # when the program that runs was first seen; None where it ran before
-        self._reported = False
+        self._program: tuple[float, bool] | None = None  # that runs: when it was first seen, and whether it is reported
 
     def feed(self, count: int) -> None:
         """Take the count that the newest program with the heartbeat found at its start."""
@@ -38,27 +36,25 @@ class ControllerHeartbeat:
 
     def sample(self, now: float, running: bool) -> None:
         """Take whether a program runs, as read at a host time [s]."""
-        if running and not self._running:
-            self._began, self._reported = now, False
-        elif not running:
-            self._began = None
-        self._running = running
+        if not running:
+            self._program = None
+        elif self._program is None:
+            self._program = now, False
 
     def blocker(self) -> str:
         """Return why the guard must not become active. Empty where it may."""
-        return _NO_HEARTBEAT if self.required and self._running and not self._depends() else ""
+        return _NO_HEARTBEAT if self.required and self._program is not None and not self._depends() else ""
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with the program that runs, once for each program. Empty where nothing is."""
-        if not self._running or self._reported or self._depends():
+        began, reported = self._program or (now, True)
+        if reported or self._depends() or now - began < _REPORT_TIME:
             return ""
-        if self._began is not None and now - self._began < _REPORT_TIME:
-            return ""
-        self._reported = True
+        self._program = began, True
         return _NO_HEARTBEAT
 
     def _depends(self) -> bool:
-        if self._began is None or not self._echo:
+        if self._program is None or not self._echo:
             return False
-        first = heartbeat_count(self._began) - _COUNT_MARGIN
+        first = heartbeat_count(self._program[0]) - _COUNT_MARGIN
         return (self._echo - first) & _COUNT_MASK < _COUNT_MASK // 2

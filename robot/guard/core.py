@@ -46,17 +46,17 @@ class _StallClock:
     """
 
     def __init__(self) -> None:
-        self._looked = -math.inf
-        self._longest = 0.0  # [s]
-        self._until = -math.inf  # when it counts no more
+        self._held_up = -math.inf, 0.0, -math.inf  # newest look; longest hold-up, and until when that counts [s]
 
     def fair(self, now: float) -> float:
         """Return the time by which silences are judged at a host time [s]. To be asked continuously."""
-        stall, self._looked = now - self._looked, now
+        looked, longest, until = self._held_up
+        stall = now - looked
         if _MIN_STALL < stall < math.inf:
-            self._longest = stall if now >= self._until else max(stall, self._longest)
-            self._until = now + self._longest
-        return now - self._longest if now < self._until else now
+            longest = stall if now >= until else max(stall, longest)
+            until = now + longest
+        self._held_up = now, longest, until
+        return now - longest if now < until else now
 
 
 #: s; a skin that is this far behind does not show what a motion away presses on, however late a scene lets it be
@@ -99,8 +99,7 @@ class GuardCore:
         self._reopened = False  # the skin's port, and the guard has not been active since
         self._contacts: dict[str, Contact] = {}  # by sensor
         self._newest_number = 0
-        self._out: Outputs | None = None  # that the alarm puts a stop into
-        self._alarm: TouchAlarm | None = None
+        self._alarm: tuple[Outputs, TouchAlarm] | None = None  # and what it puts a stop into
         self._extended = 0  # number of the newest touch that was reported as not one disc
         self._located: set[str] = set()  # sensors whose touch had a certain place in its newest event
         self._feeders: dict[int, Callable[[Block, Outputs], None]] = {
@@ -172,11 +171,11 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
-        if out is not self._out:  # the same one with every input
-            self._out, self._alarm = out, partial(self._stop, out)
+        if self._alarm is None or self._alarm[0] is not out:  # the same one with every input
+            self._alarm = out, partial(self._stop, out)
         guarded = self._arm is not None and self._arm.supervision.phase is Phase.ACTIVE
         held_up = block.time - self._fair
-        for event in self._stream.feed(block.payload, block.time, self._alarm if guarded else None, held_up):
+        for event in self._stream.feed(block.payload, block.time, self._alarm[1] if guarded else None, held_up):
             self._feed_event(event, out)
         if self._contacts:
             self._update_contacts(block.time, out)

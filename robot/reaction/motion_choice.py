@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
@@ -23,6 +23,15 @@ _PUSH_DAMPING = 1500.0  # N s/m; between a push that the joints feel and the spe
 _MAX_CARRIED = 15.0  # N that something else may take off a push whose touch does not become lighter
 _FOLLOWED_SHARE = 0.5  # of a firm push that is followed, while nothing takes anything off it
 _LIGHTER = 0.01  # of the level; six times its noise
+
+
+class _PushStep(NamedTuple):
+    """One step of a motion that follows a push."""
+
+    time: float  # [s]
+    speed: float = 0.0  # of the touched point that was wanted [m/s]
+    progress: float = 0.0  # how far touched points had given way [m]
+    plan: RetreatPlan | None = None  # whose tracks start where the touched points were; None where nothing pushed
 
 
 class _AdmittanceMotion:
@@ -47,8 +56,7 @@ class _AdmittanceMotion:
         space: the room that the arm has, or None.
 
     Attributes:
-        speed: of the touched point that was wanted in the last step [m/s].
-        plan: of the last step, whose tracks start where the touched points were then; None where nothing pushed.
+        last: step.
     """
 
     how = "push"  #: the arm leaves with it
@@ -58,11 +66,9 @@ class _AdmittanceMotion:
         self._reaction = reaction
         self._space = space
         self._sweep = ArmSweep.begin(model, state.q)
-        self._began = self._newest = state.time
-        self._progress = 0.0  # how far touched points have given way so far [m]
+        self._began = state.time
         self._strongest = 0.0, 0.0  # push since the touch became lighter [N], and its level
-        self.speed = 0.0
-        self.plan: RetreatPlan | None = None
+        self.last = _PushStep(state.time)
 
     def update(self, state: ArmState, contacts: Sequence[ContactOnLink]) -> JointVelocity | Done:
         """Return what to do in this control cycle, as firm as the current push.
@@ -72,9 +78,9 @@ class _AdmittanceMotion:
             contacts: the touches there are. Without one it is over.
         """
         reaction = self._reaction
-        progress = self._progress
-        if self.plan is not None:
-            progress += max(0.0, progress_of(self.plan, state.q))
+        last, progress = self.last, self.last.progress
+        if last.plan is not None:
+            progress += max(0.0, progress_of(last.plan, state.q))
         if not contacts:
             return Done("the touch is over", progress, complete=True)
         if not progress < reaction.distance - DISTANCE_TOLERANCE:
@@ -86,10 +92,10 @@ class _AdmittanceMotion:
         placed = all(contact.location_valid for contact in contacts)  # as a push ends, its place is lost before itself
         against = placed and opposed(self._model, state.q, contacts)
         wanted = _wanted_speed(reaction, contacts) if placed and not against else 0.0
-        share = 1.0 - math.exp(-max(0.0, state.time - self._newest) / _DAMPING_TIME)
-        speed = self.speed + share * (wanted - self.speed)
+        share = 1.0 - math.exp(-max(0.0, state.time - last.time) / _DAMPING_TIME)
+        speed = last.speed + share * (wanted - last.speed)
         if speed < _MIN_SPEED or not placed or against:
-            self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, None
+            self.last = _PushStep(state.time, speed, progress)
             clipped_by = ("opposed" if against else "level" if placed else "place",)
             # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
             gentle = placed and not against
@@ -107,14 +113,14 @@ class _AdmittanceMotion:
             driven = sum(t * v - doubt * abs(v) for t, doubt, v in rows) / step.away
         if step.away > (most := max(0.0, self._free_push(driven, contacts)) / _PUSH_DAMPING):
             share = most / step.away
-            rate = reaction.deceleration if most < self.speed else reaction.acceleration
+            rate = reaction.deceleration if most < last.speed else reaction.acceleration
             step = replace(step, qd=tuple(share * v for v in step.qd), away=most, acceleration=rate)
             clipped, speed = (*clipped, "push"), most
         if wanted < reaction.speed:
             clipped += ("level",)
         if speed < 0.99 * wanted:  # it gets there, but never quite
             clipped += ("damping",)
-        self._newest, self.speed, self._progress, self.plan = state.time, speed, progress, plan
+        self.last = _PushStep(state.time, speed, progress, plan)
         return replace(step, progress=progress, clipped_by=clipped)
 
     def _free_push(self, driven: float, contacts: Sequence[ContactOnLink]) -> float:

@@ -34,18 +34,15 @@ class _FollowingErrorMonitor:
     """Monitor of one reaction motion, from the host time on at which it begins [s]."""
 
     def __init__(self, now: float) -> None:
-        self._commanded: JointVelocity | None = None
+        #: newest command; top speed of all [rad/s]; progress below which the motion has gone backwards [m]
+        self._commands: tuple[JointVelocity, float, float] | None = None
         self._in_tolerance_at = now
-        self._top_speed = 0.0  # of all commands [rad/s]
-        self._fast = 0  # samples in a row above it
-        self._least_progress = 0.0  # below which the motion has gone backwards [m]
+        self._fast = 0  # samples in a row above the top speed
 
     def command(self, step: JointVelocity) -> None:
         """Take what the arm is commanded now."""
-        if self._commanded is None:
-            self._least_progress = step.progress - _MAX_APPROACH
-        self._commanded = step
-        self._top_speed = max(self._top_speed, *map(abs, step.qd))
+        _, top, least = self._commands or (step, 0.0, step.progress - _MAX_APPROACH)
+        self._commands = step, max(top, *map(abs, step.qd)), least
 
     def exceeded(self, state: ControllerState, progress: float) -> bool:
         """Take a measured state and tell whether the arm moves otherwise than commanded.
@@ -53,11 +50,11 @@ class _FollowingErrorMonitor:
         A slower motion in the same direction is within tolerance: the controller's speed slider makes it so. The
         progress is that of the motion [m].
         """
-        commanded = self._commanded
-        if commanded is None:
+        if self._commands is None:
             return False
-        self._fast = self._fast + 1 if state.speed > self._top_speed + _MAX_OVERSPEED else 0
-        if self._fast >= STANDSTILL_SAMPLES or progress < self._least_progress:
+        commanded, top, least = self._commands
+        self._fast = self._fast + 1 if state.speed > top + _MAX_OVERSPEED else 0
+        if self._fast >= STANDSTILL_SAMPLES or progress < least:
             return True
         leading = max(map(abs, commanded.qd))
         if _difference(state.qd, commanded.qd) <= _SPEED_TOLERANCE + _RELATIVE_TOLERANCE * leading:

@@ -272,8 +272,7 @@ class RecordingOverflowFilter:
     """Filter for ``Channel.overflow``, where each message consists of whole blocks of a recording."""
 
     def __init__(self) -> None:
-        self._left_out = 0
-        self._since = self._until = 0.0
+        self._gap = 0, 0.0, 0.0  # blocks that were left out, since when, until when [s]
 
     def shorten(self, message: bytes) -> bytes:
         """Return the events in a message. The rest of it is counted."""
@@ -282,21 +281,19 @@ class RecordingOverflowFilter:
             if block.kind == BlockKind.EVENT:
                 kept.append(encode_block(block))
                 continue
-            if not self._left_out:
-                self._since = block.time
-            self._left_out += 1
-            self._until = block.time
+            count, since, _ = self._gap
+            self._gap = count + 1, since if count else block.time, block.time
         return b"".join(kept)
 
     def notice(self) -> bytes:
         """Return the event that says what was left out since the last one. Empty where nothing was."""
-        if not self._left_out:
+        count, since, until = self._gap
+        if not count:
             return b""
-        length = self._until - self._since
-        what = f"{self._left_out} blocks of {length:.3f} s are not recorded: the program did not read them"
-        details = {"what": what, "blocks": self._left_out, "since": self._since, "until": self._until}
-        self._left_out = 0
-        return encode_block(GuardEvent(EventName.RECORDING_GAP, self._until, details).block())
+        what = f"{count} blocks of {until - since:.3f} s are not recorded: the program did not read them"
+        details = {"what": what, "blocks": count, "since": since, "until": until}
+        self._gap = 0, 0.0, 0.0
+        return encode_block(GuardEvent(EventName.RECORDING_GAP, until, details).block())
 
 
 _BURST_EVENTS = 10  # events of a kind that come as they are

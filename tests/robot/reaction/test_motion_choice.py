@@ -165,7 +165,7 @@ def test_a_push_whose_place_is_not_known_holds_the_arm():
     step = motion.update(ArmState(0.1, Q, torque=pushed(Q)), [FOREARM, lost])
     assert step.qd == ZERO_VELOCITY
     assert step.clipped_by == ("place",)
-    assert motion.plan is None
+    assert motion.last.plan is None
 
 
 @pytest.mark.promise("P38")
@@ -175,7 +175,7 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
 
     def complying(speed):
         motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), reaction)
-        motion.speed = speed
+        motion.last = motion.last._replace(speed=speed)
         return motion
 
     lost = ContactOnLink(3, FOREARM.point, FOREARM.normal, 0.9, False, 0.1)
