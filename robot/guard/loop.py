@@ -176,7 +176,7 @@ class GuardLoop:
         self._ports = ports
         self._clock = clock
         self._sleepless_clock = sleepless_clock
-        self._round_at, self._sleepless_at = clock(), sleepless_clock()  # when the newest round began
+        self._round = clock(), sleepless_clock()  # when the newest one began
         #: the skin has no descriptor that tells that it has bytes
         self._blind = ports.source is not None and ports.source.fileno() is None
         self._watched: dict[int, HasFileno] = {}
@@ -264,11 +264,10 @@ class GuardLoop:
     def poll(self, timeout: float) -> None:
         """Wait for input, or for the timeout [s], and serve it."""
         ready = self._wait(timeout)
-        ports, now, before = self._ports, self._clock(), self._round_at
-        sleepless = self._sleepless_clock()
-        if now - before > _OVERRUN_TIME or sleepless - self._sleepless_at > _SUSPENSION_TIME:
-            self._note_overrun(now, now - before, sleepless - self._sleepless_at)
-        self._round_at, self._sleepless_at = now, sleepless
+        ports, (before, sleepless_before) = self._ports, self._round
+        self._round = now, sleepless = self._clock(), self._sleepless_clock()
+        if now - before > _OVERRUN_TIME or sleepless - sleepless_before > _SUSPENSION_TIME:
+            self._note_overrun(now, now - before, sleepless - sleepless_before)
         if ready & _READER and self._core.phase.stopping:  # states that wait may show that the stop under way works
             self._read(ports.reader, "controller", BlockKind.ARM)
             ready &= ~_READER

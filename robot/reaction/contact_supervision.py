@@ -178,7 +178,7 @@ class ContactApproach:
     def __init__(self, model: ArmModel, q: Joints, qd: Joints, deceleration: float, press: float) -> None:
         self._model = model
         self._reach = reach(model)
-        self._q, self._qd = q, qd
+        self._last = q, qd
         self._deceleration = deceleration
         self._press = press
         self._touches: dict[int, _Approach] = {}
@@ -189,7 +189,7 @@ class ContactApproach:
 
     def update(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
-        speeds = []
+        speeds, (last_q, last_qd) = [], self._last
         lasting = {contact.number for contact in contacts}
         for number, one in self._touches.items():
             one.over = number not in lasting
@@ -201,7 +201,7 @@ class ContactApproach:
             if placed and not touch.placed:  # only now it shows how far it has gone into it
                 touch.placed, touch.blind, since = True, touch.earlier, touch.q
             else:
-                since = self._q
+                since = last_q
             bound, speed, _ = self._motion(contact, since, q, qd, placed)
             step, _, approach = self._motion(contact, since, q, qd)
             speeds.append(speed)
@@ -216,16 +216,16 @@ class ContactApproach:
             self.speed = max(speeds)
             self.certain = all(contact.location_valid for contact in contacts)
         elif self._touches:  # nothing touches any more: what the arm is compared with is its own speed, in proportion
-            before, now = max(map(abs, self._qd)), max(map(abs, qd))
+            before, now = max(map(abs, last_qd)), max(map(abs, qd))
             self.speed = self.speed * now / before if before > 0.0 else self.speed
-        self._q, self._qd = q, qd
+        self._last = q, qd
 
     def _begin(self, contact: ContactOnLink) -> _Approach:
         """Return a new touch; one that flickers is one, and goes on from the ways into those over on its link."""
         ended = [one for one in self._touches.values() if one.link == contact.link and one.over]
         made = max((one.made for one in ended), default=0.0)
         blind = max((one.blind for one in ended), default=0.0)
-        return _Approach(self._q, contact.link, made, blind, blind)
+        return _Approach(self._last[0], contact.link, made, blind, blind)
 
     def _stop(self, speed: float, qd: Joints) -> float:
         """Return the way of a surface in a stop [m], from its speed into the touch [m/s] and the joints' [rad/s]."""

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from enum import Enum
 
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.messages import EndReaction, StopProgram
@@ -29,6 +30,15 @@ _BLIND_TIMEOUT = 2.0  # s without a state after which a stop is given up, and th
 _CONNECT_TIMEOUT = 0.5  # s that opening the reader may take
 
 
+class _HoldPhase(Enum):
+    RESTING = "nothing was stopped yet"
+    STOPPING = "a stop is under way"
+    STOPPING_AGAIN = "the same, after one that has failed"
+    STANDING = "it stands, and is watched"
+    CONFIRMED = "it has stood for a whole watch"
+    FAILED = "no state shows that it stands"
+
+
 class StandstillHold:
     """Hold of one arm at standstill. A person who pushes or jogs the arm is left alone: no program runs then.
 
@@ -42,10 +52,6 @@ class StandstillHold:
 
     Attributes:
         reader: connection that tells of new states; None while there is none.
-        stopping: True from a stop until the arm was measured standing, or no state has come for too long.
-        stands: True where the arm was seen standing for a whole watch after the newest stop, and ever since.
-        failed: True where the newest stop was given up before the arm was seen standing, or where its state has been
-            missing for so long since then that it would be given up.
     """
 
     def __init__(
@@ -58,7 +64,7 @@ class StandstillHold:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.reader = reader
-        self.stopping = self.stands = self.failed = False
+        self._phase = _HoldPhase.RESTING
         self._driver = driver
         self._connections = connections
         self._limits = limits
@@ -85,7 +91,22 @@ class StandstillHold:
         self._began = self._due = now = self._clock()
         speed = None if self._state is None or self.states_missing() else self._state.speed
         self._stop.begin(now, speed, self._deceleration)
-        self.stopping, self.stands = True, False
+        self._phase = _HoldPhase.STOPPING_AGAIN if self.failed else _HoldPhase.STOPPING
+
+    @property
+    def stopping(self) -> bool:
+        """True from a stop until the arm was measured standing, or no state has come for too long."""
+        return self._phase is _HoldPhase.STOPPING or self._phase is _HoldPhase.STOPPING_AGAIN
+
+    @property
+    def stands(self) -> bool:
+        """True where the arm was seen standing for a whole watch after the newest stop, and ever since."""
+        return self._phase is _HoldPhase.CONFIRMED
+
+    @property
+    def failed(self) -> bool:
+        """True from a stop that was given up, or states that stay away for as long, until the arm is seen standing."""
+        return self._phase is _HoldPhase.FAILED or self._phase is _HoldPhase.STOPPING_AGAIN
 
     def append(self, command: StopProgram | EndReaction | UseStopPath, /) -> None:
         """Send a stop by one path, or by ``COMMAND`` where its connection is not there."""
@@ -105,24 +126,25 @@ class StandstillHold:
         watch = self._stop.watch
         moved = sum(watch.moved(state, True) for state, _ in states) > 0  # every state has to be taken
         if self._began is not None and self.states_missing():
-            self.stands = False
+            if self._phase is _HoldPhase.CONFIRMED:
+                self._phase = _HoldPhase.STANDING
             if now >= self._due:
                 self._reconnect()
                 for path in (StopPath.PROGRAM, StopPath.COMMAND):
                     self._use(path)
                 self._due = self._clock() + _REPEAT_PERIOD
-                self.failed = self.failed or self.states_missing(_BLIND_TIMEOUT)
+                if self.states_missing(_BLIND_TIMEOUT):
+                    self._phase = _HoldPhase.FAILED
             return False
         if moved or not watch.under_way:
             self.begin()
             return False
-        self.failed = False
         if self.stands:
             return False
-        self.stands = watch.confirmed
-        if not self.stands and self._state is not None:
+        self._phase = _HoldPhase.CONFIRMED if watch.confirmed else _HoldPhase.STANDING
+        if not watch.confirmed and self._state is not None:
             self._stop.insist(self._state, self)
-        return self.stands
+        return watch.confirmed
 
     def close(self) -> None:
         """Close all connections; may be called again."""
@@ -135,11 +157,11 @@ class StandstillHold:
         for state, measured_at in states:
             if self._stop.update(state, measured_at)[1]:
                 self._stop.stay(state)
-                self.stopping = self.failed = False
+                self._phase = _HoldPhase.STANDING
         if not self.stopping:
             return False
         if now - max(self._began, self._age.newest.fresh_at) >= _BLIND_TIMEOUT:
-            self.stopping, self.failed = False, True
+            self._phase = _HoldPhase.FAILED
             self._due = now + _REPEAT_PERIOD
             return True
         if now >= self._due:

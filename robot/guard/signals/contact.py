@@ -140,8 +140,8 @@ class TouchRecord:
         self._rules = rules
         self.contacts: Sequence[ContactOnLink] = ()
         self.placed: Sequence[ContactOnLink] = ()
-        self._speed = math.inf  # of the leading joint when the first began [rad/s]
-        self._levels: dict[int, float] = {}  # link -> firmest
+        #: speed of the leading joint when the first began [rad/s], and the firmest level of each link
+        self._since: tuple[float, dict[int, float]] = math.inf, {}
         self._newest: Sequence[Contact] = ()
 
     @property
@@ -151,14 +151,14 @@ class TouchRecord:
 
     def begin(self, contact: Contact, speed: float) -> None:
         """Forget the touches before this one, which came at a speed of the leading joint [rad/s]."""
-        self._speed, self._levels = speed, {contact.where.link: contact.touch.level}
+        self._since = speed, {contact.where.link: contact.touch.level}
 
     def update(self, contact: Contact) -> Reaction:
         """Take how firm a touch is now, and return the reaction to it."""
-        link, level = contact.where.link, contact.touch.level
-        if level > self._levels.get(link, 0.0):
-            self._levels[link] = level
-        return self._rules.choose(link, level, self._speed)
+        link, level, (speed, levels) = contact.where.link, contact.touch.level, self._since
+        if level > levels.get(link, 0.0):
+            levels[link] = level
+        return self._rules.choose(link, level, speed)
 
     def feed(self, contacts: Sequence[Contact], stopping: bool) -> None:
         """Take what the newest frame says of every touch that there is. ``stopping`` while the arm stops."""
@@ -179,4 +179,5 @@ class TouchRecord:
 
     def hardest(self) -> Reaction:
         """Return the reaction to all of them, each as firm as it has been."""
-        return self._rules.hardest(self._levels.items(), self._speed)
+        speed, levels = self._since
+        return self._rules.hardest(levels.items(), speed)
