@@ -29,7 +29,7 @@ COMPILED = {
 #: what stays Python there: an enumeration with a __new__, protocols, a keyword of C as a name
 UNFIT = {"journal", "deadman", "protocol"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays
-PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "wiring_hypothesis", "inertia"}
+PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "fault_diagnosis", "inertia"}
 PREPARATION |= {"inverse_kinematics"}
 PROCESSES = {"backup_stop", "guard_watchdog", "driver", "driver_process", "examination", "input_writers"}
 PROCESSES |= {"model_check", "program_io", "rtde_connection", "stop_sockets", "tcp", "ur_rtde"}

@@ -216,11 +216,6 @@ class Detector:
         """Counts that are taken off each drive current: the bias and the offset of its amplifier."""
         return self._zero.counts
 
-    @property
-    def baseline(self) -> float:
-        """Drift of the untouched level that is taken off."""
-        return self._level.value
-
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.
 

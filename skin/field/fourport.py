@@ -27,10 +27,8 @@ from .sheet import SectorSheet
 if TYPE_CHECKING:
     Numbers = float | Floats
 
-#: Order of every axis over electrodes: A (end 2) and B (end 1) of the upper sheet, C (phi=wrap) and D (phi=0) below.
-ELECTRODES = ("A", "B", "C", "D")
-
-# h = (h0, hx, hy) of the potentials of (A, B, C, D); its transpose gives the currents into the sensor.
+# h = (h0, hx, hy) of the potentials of A (end 2) and B (end 1) of the upper sheet, C (phi=wrap) and D (phi=0) below:
+# the order of every axis over electrodes; its transpose gives the currents into the sensor
 _DIFFERENCE_MATRIX = np.array([[0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 
 

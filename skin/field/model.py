@@ -96,13 +96,7 @@ class FieldModel:
         Raises:
             FieldError: a disc that cannot be; the tolerance cannot be met (only without `order`).
         """
-        given = u, phi, radius, conductance
-        # A plain number at a time is solved before numpy has read it.
-        if (
-            order is None and all(type(v) is float for v in given) and (one := self._scenes.solve([given]))  # type: ignore[list-item]
-        ):
-            return one
-        arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in given))
+        arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (u, phi, radius, conductance)))
         if arrays[0].ndim not in (0, 1, 2):
             raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
         shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]

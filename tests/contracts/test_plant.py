@@ -32,7 +32,7 @@ QD = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 def physics() -> Plant:
     pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
-    from coneskin.impact.simulation.scene_plant import ScenePlant
+    from coneskin.impact.simulation.mujoco_plant import ScenePlant
 
     far = BodyScene("hand", (2.0, 0.0, 0.0), mass=0.6, stiffness=1e3)
     return ScenePlant(replace(parse_scene(forearm_scene()), bodies=(far,)), START)

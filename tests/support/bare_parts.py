@@ -7,8 +7,8 @@ import math
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
+from coneskin.impact.simulation.mujoco_plant import sheets_of
 from coneskin.impact.simulation.scene_description import SheetOnLink
-from coneskin.impact.simulation.scene_plant import sheets_of
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.arm.vectors import cross, dot, minus, scaled
 from coneskin.robot.arm.workspace import arm_parts

@@ -415,7 +415,4 @@ class UntouchedLevel:
             level: of a frame in which nothing shows, less ``value``.
             period: time from frame to frame [s].
         """
-        most = self._rate * period
-        self.value += most if level > most else -most if level < -most else level
-        if not -self._limit <= self.value <= self._limit:
-            self.value = math.copysign(self._limit, self.value)
+        self.value = bounded(self.value + bounded(level, self._rate * period), self._limit)

@@ -16,7 +16,7 @@ from tests.support.scenes import forearm_scene, start_with
 
 pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
 
-from coneskin.impact.simulation.scene_plant import ScenePlant
+from coneskin.impact.simulation.mujoco_plant import ScenePlant
 from tests.support.plant_state import part_velocity
 
 START = start_with(-10.0)

@@ -219,7 +219,7 @@ def test_slow_drift_is_followed_while_untouched_and_frozen_while_touched():
     events, detector = play(skin, DetectorSettings(settle_frames=10))
     assert faults_of(events) == []
     assert [type(e) for e in events if not isinstance(e, TouchMoved)] == [TouchBegan, TouchEnded]
-    assert detector.baseline == pytest.approx(0.0125, abs=0.001)
+    assert detector._level.value == pytest.approx(0.0125, abs=0.001)
     before, _ = play(
         VirtualSkin(SENSOR, rate_hz=50, duration=60.0, imperfections=damp), DetectorSettings(settle_frames=10)
     )

@@ -6,7 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection import wiring_hypothesis
+from coneskin.skin.detection import fault_diagnosis
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault, TouchBegan, TouchEvent
 from coneskin.skin.detection.frame.faults import Fault
@@ -34,8 +34,8 @@ def faults_of(faults, touches=(TOUCH,), polarity=None, duration=0.3, **skin):
 
 def test_no_frame_builds_more_than_one_hypothesis(monkeypatch):
     built, most = [], 0
-    phases = wiring_hypothesis._phases
-    monkeypatch.setattr(wiring_hypothesis, "_phases", lambda *broken: built.append(broken) or phases(*broken))
+    phases = fault_diagnosis._phases
+    monkeypatch.setattr(fault_diagnosis, "_phases", lambda *broken: built.append(broken) or phases(*broken))
     sensor = Sensor(FOREARM)
     detector = Detector(sensor)
     breaks = FaultInjection(wiring=WiringFaults(("A",)), wiring_after=BREAKS)
@@ -43,7 +43,7 @@ def test_no_frame_builds_more_than_one_hypothesis(monkeypatch):
         before = len(built)
         detector.feed(frame, time)
         most = max(most, len(built) - before)
-    assert (most, len(built)) == (1, len(wiring_hypothesis.list_hypotheses(sensor)))
+    assert (most, len(built)) == (1, len(fault_diagnosis._list_hypotheses(sensor)))
 
 
 def short(one, other):

@@ -23,7 +23,7 @@ def play(skin: VirtualSkin) -> tuple[list[SkinEvent], Detector, list[float]]:
     detector, events, baselines = Detector(SENSOR, settings), [], []
     for time, frame in skin.frames():
         events += detector.feed(frame, time)
-        baselines.append(detector.baseline)
+        baselines.append(detector._level.value)
     return events, detector, baselines
 
 

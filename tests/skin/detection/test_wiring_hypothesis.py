@@ -6,7 +6,7 @@ import random
 import pytest
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.wiring_hypothesis import PointContact, list_hypotheses
+from coneskin.skin.detection.fault_diagnosis import _list_hypotheses, _PointContact
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder, WiringFaults, measure
@@ -30,7 +30,7 @@ def test_every_reading_of_every_hypothesis_is_the_circuit_s(polarity):
     sensor = Sensor(FOREARM, polarity=polarity)
     rng = random.Random(5)
     upper, lower = 1.0 / sensor.radial_ohms, 1.0 / sensor.angular_ohms
-    hypotheses = [each for each in list_hypotheses(sensor) if "dead" not in each.words]
+    hypotheses = [each for each in _list_hypotheses(sensor) if "dead" not in each.words]
     assert len(hypotheses) == 23
     for hypothesis in hypotheses:
         x, y, siemens = rng.uniform(0.05, 0.95), rng.uniform(0.05, 0.95), 10.0 ** rng.uniform(-4.0, -2.0)
@@ -39,7 +39,7 @@ def test_every_reading_of_every_hypothesis_is_the_circuit_s(polarity):
         inputs = measure(sensor, (sheets, sheets, sheets), wiring_of(hypothesis.words))
         supply = sensor.electronics.supply_volts
         expected = [value / supply for value in (*inputs[:9], *inputs[12:])]
-        found = hypothesis.predict(PointContact(siemens, x, y), upper, lower, [math.inf] * 15)
+        found = hypothesis.predict(_PointContact(siemens, x, y), upper, lower, [math.inf] * 15)
         # the circuit joins by 0.1 ohm, which a lead of 1 ohm turns into 5 % of the supply; a prediction joins by none
         slack = 0.1 if "joined with" in hypothesis.words else 1e-6
         for k, (one, other) in enumerate(zip(found, expected, strict=True)):
@@ -51,9 +51,9 @@ def test_every_reading_of_every_hypothesis_is_the_circuit_s(polarity):
 
 def test_a_dead_input_reads_nothing_and_what_exceeds_the_converter_reads_its_end():
     sensor = Sensor(FOREARM)
-    by_words = {each.words: each for each in list_hypotheses(sensor)}
+    by_words = {each.words: each for each in _list_hypotheses(sensor)}
     highest = [1.2] * 9
-    contact, sheets = PointContact(1e-3, 0.5, 0.5), (1e-3, 1e-3)
+    contact, sheets = _PointContact(1e-3, 0.5, 0.5), (1e-3, 1e-3)
     dead = by_words["input of C dead"].predict(contact, *sheets, highest)
     assert (dead[0], dead[3]) == (0.0, 0.0)
     assert dead[1] > 0.1
@@ -74,14 +74,14 @@ ALIKE = [
 @pytest.mark.parametrize("words", ALIKE, ids=lambda words: words[0])
 def test_what_cannot_be_told_apart_without_a_touch_is_in_the_circuit(words):
     sensor = Sensor(FOREARM)
-    by_words = {each.words: each for each in list_hypotheses(sensor)}
+    by_words = {each.words: each for each in _list_hypotheses(sensor)}
     parts = sensor.electronics
     full = parts.adc_volts / parts.supply_volts
     highest = [full, full, parts.current_full_scale / parts.supply_volts] * 3
     count = full / parts.full_count
     sheets = 1.0 / sensor.radial_ohms, 1.0 / sensor.angular_ohms
     for where, touch in (("bare", 0.0), ("touched", 1e-3)):
-        first, *others = (by_words[each].predict(PointContact(touch, 0.3, 0.6), *sheets, highest) for each in words)
+        first, *others = (by_words[each].predict(_PointContact(touch, 0.3, 0.6), *sheets, highest) for each in words)
         for other in others:
             apart = max(abs(a - b) for k, (a, b) in enumerate(zip(first, other, strict=True)) if k not in (2, 5, 8))
             assert apart < 0.5 * count if where == "bare" else apart > 50.0 * count

@@ -35,7 +35,6 @@ from .taylor_integrator import integrate
 from .two_mass_contact import DrivenArm, TwoMassContact
 
 if TYPE_CHECKING:
-    from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.values.scene import Scene
 
     from .arm_patches import ArmPatch
@@ -233,7 +232,8 @@ def map_speeds(
     lightest, masses = [0.0] * len(patches), [math.inf] * len(patches)
     assert scene.arm is not None  # or there were no patches
     arm = arm_model(scene.arm.model)
-    inertias, positions = inertias_of(scene.arm), _any_positions(arm)
+    inertias, chance = inertias_of(scene.arm), random.Random(0)
+    positions = [tuple(chance.uniform(-math.pi, math.pi) for _ in range(arm.joints)) for _ in range(_POSITION_COUNT)]
     everywhere = extra_ways(arm, patches, positions, inertias)
     extras = everywhere
     braking = limits.measured.deceleration
@@ -280,11 +280,6 @@ def map_speeds(
         patches=tuple(rows),
     )
     return SpeedMap(table, tuple(found), tuple(patches), tuple(masses))
-
-
-def _any_positions(arm: ArmModel) -> list[tuple[float, ...]]:
-    chance = random.Random(0)
-    return [tuple(chance.uniform(-math.pi, math.pi) for _ in range(arm.joints)) for _ in range(_POSITION_COUNT)]
 
 
 def _most(extras: Sequence[ExtraWay], link: int, patches: Sequence[ArmPatch]) -> ExtraWay:

@@ -35,9 +35,8 @@ from coneskin.skin.materials import Padding
 from coneskin.skin.virtual.skin import PressedSkin
 
 from .impact_outcome import ImpactMeter, ImpactOutcome, TouchRecorder, TruthRecorder
-from .mujoco_plant import MujocoPlant
+from .mujoco_plant import MujocoPlant, sheets_of
 from .scene_description import SheetOnLink
-from .scene_plant import sheets_of
 
 _MAX_FORCE = 150.0  # N, at which the imitated limit stops the arm
 _FILTER_TIME = 0.01  # s
@@ -115,8 +114,6 @@ class CollisionRun:
         q: joint positions at the start [rad].
         protection: of `PROTECTIONS`.
         seed: of the skins' noise.
-        sheets: model of the skins' sheets, "ladder" or "field".
-        heeds: True where what moves the arm obeys the speed slider; a stream of servo setpoints does not.
         bare: parts of the arm without a skin that bodies meet too.
         period: as of `MujocoPlant`.
         note: is told each block that the guard takes, each event that it makes, the force of the contacts, where
@@ -140,8 +137,6 @@ class CollisionRun:
         *,
         protection: str = "guard",
         seed: int = 0,
-        sheets: str = "ladder",
-        heeds: bool = True,
         bare: Sequence[SheetOnLink] = (),
         period: int = 1,
         note: Callable[[Block], None] = lambda _: None,
@@ -150,7 +145,7 @@ class CollisionRun:
         model = arm_model(scene.arm.model)
         padding = scene.padding or Padding()
         self.plant = MujocoPlant(model, sheets_of(scene), bodies, padding, q, period=period, bare=bare)
-        self.arm = MockArm(list(q), [0.0] * model.joints, heeds=heeds)
+        self.arm = MockArm(list(q), [0.0] * model.joints)
         self.meter = ImpactMeter()
         self.events: list[GuardEvent] = []
         self.now = 100.0
@@ -158,7 +153,7 @@ class CollisionRun:
         self._limit = _ForceLimit(model)
         self._core = build_core(scene) if protection == "guard" else None
         sensors = [item.sensor for item in scene.sensors]
-        self._device = PressedSkin(sensors, seed=seed, model=sheets)
+        self._device = PressedSkin(sensors, seed=seed)
         self._packets = self._device.packets()
         self._companions = CompanionProcesses()
         self._commands: deque[tuple[int, object]] = deque()
@@ -252,13 +247,11 @@ class CollisionRun:
 
     def _measure(self) -> None:
         plant = self.plant
-        rate = max((contact.rate for contact in plant.contacts), default=0.0)
-        speed = max(map(abs, plant.qd))
         touches = self._touches.feed(self.now, plant.presses.values())
         for block in (self._truth.feed(self.now, plant.force, plant.places), touches):
             if block is not None:
                 self._note(block)
-        self.meter.feed(self.now, plant.force, rate, plant.peak, plant.deepest, plant.impulse, speed)
+        self.meter.feed(self.now, plant)
 
     # guard
 

@@ -10,13 +10,16 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coneskin.core.recording.block import Block
 from coneskin.geometry.pose import Vector
 from coneskin.robot.guard.signals.journal import BlockKind, force_block
 from coneskin.skin.virtual.imperfections import ContactLaw
 from coneskin.skin.virtual.skin import Press
+
+if TYPE_CHECKING:
+    from .mujoco_plant import MujocoPlant
 
 _REPEAT_PERIOD = 10.0  # s after which what was told is told again, for who looks on from later
 _MIN_BODY_MOTION = 1e-4  # m by which a body that nothing touches must have moved
@@ -145,27 +148,16 @@ class ImpactMeter:
         """True once the clamping force was taken."""
         return self._now - self.began > CLAMP_TIME
 
-    def feed(
-        self, time: float, force: float, rate: float, peak: float, depth: float, impulse: float, speed: float
-    ) -> None:
-        """Take a step.
-
-        Args:
-            time: [s].
-            force: sum of all forces now [N].
-            rate: greatest speed of the surfaces towards each other now [m/s].
-            peak: greatest force so far [N].
-            depth: greatest indentation so far [m].
-            impulse: so far [N s].
-            speed: of the fastest joint, measured [rad/s].
-        """
+    def feed(self, time: float, plant: MujocoPlant) -> None:
+        """Take the plant as it is at a time [s]."""
         if math.isnan(self.began):
-            if peak <= 0.0:
+            if plant.peak <= 0.0:
                 return
-            self.began, self._approach = time, rate
-        self._peak, self._depth = peak, depth
+            self.began, self._approach = time, max((contact.rate for contact in plant.contacts), default=0.0)
+        self._peak, self._depth = plant.peak, plant.deepest
         if time - self.began <= CLAMP_TIME:
-            self._impulse, self._clamp = impulse, force
+            self._impulse, self._clamp = plant.impulse, plant.force
+        speed = max(map(abs, plant.qd))
         if self._now - self._stood < _STANDSTILL_TIME and speed > _STANDSTILL_SPEED:
             self._stood = math.nan
         elif math.isnan(self._stood) and speed <= _STANDSTILL_SPEED:

@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> int:
     from coneskin.scene.reader import parse_scene
 
     from .impact_outcome import ImpactMeter, TouchRecorder, TruthRecorder
-    from .scene_plant import ScenePlant
+    from .mujoco_plant import ScenePlant
 
     while not (hello := program.receive()) and not program.closed:
         wait_readable([program], _POLL_TIMEOUT)
@@ -78,9 +78,7 @@ def main(arguments: list[str]) -> int:
             for truth in (recorder.feed(now, physics.force, physics.places), touches.feed(now, presses.values())):
                 if truth is not None:
                     skin.send(encode_json({"truth": truth.payload.decode(), "time": truth.time}))
-            rate = max((contact.rate for contact in physics.contacts), default=0.0)
-            speed = max(map(abs, state.qd))
-            meter.feed(now, physics.force, rate, physics.peak, physics.deepest, physics.impulse, speed)
+            meter.feed(now, physics)
         if program in ready:
             _report(program, meter)
     return 0
