@@ -123,14 +123,18 @@ class BoardCircuit(NamedTuple):
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
-        """Return the netlist that KiCad's layout reads."""
+        """Return the netlist that KiCad's layout reads; pins by their footprints' numbers where those are known."""
         catalog = part_catalog()
         nets: dict[str, list[str]] = {}
         found: list[str] = []
         for name, part, value, _, pins in self.components:
-            found.append(f'    (comp (ref "{name}") (value "{value or catalog[part]["number"]}"))')
+            row = catalog[part]
+            place = f' (footprint "{row["footprint"]}")' if "footprint" in row else ""
+            found.append(f'    (comp (ref "{name}") (value "{value or row["number"]}"){place})')
+            numbers = row.get("pins", {})
             for pin, net in pins.items():
-                nets.setdefault(net, []).append(f'(node (ref "{name}") (pin "{pin}"))')
+                nodes = (f'(node (ref "{name}") (pin "{number}"))' for number in numbers.get(pin, pin).split())
+                nets.setdefault(net, []).extend(nodes)
         for pin, net in self.pins.items():
             nets.setdefault(net, []).append(f'(node (ref "A1") (pin "{pin}"))')
         found = [f'    (comp (ref "A1") (value "{self.facts.title}"))', *found]
@@ -291,7 +295,8 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     if parts.supply_volts == _FIXED_VOLTS:
         yield part("U", "regulator", IN="5V", OUT="REG", GND="GND")
     else:
-        yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND")
+        unused = {"ILIM": "GND", "PGFB": "5V"}  # no limit of the current, no quick start
+        yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND", **unused)
         yield two("R", "precise", ohms_text(1e4 * parts.supply_volts), "SET", "GND")
         yield two("C", "decoupling", "4.7 uF", "SET", "GND")
     yield two("C", "decoupling", "10 uF", "REG", "GND")
@@ -346,7 +351,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         numbers = (*circuit.board.sense, circuit.board.current, circuit.board.supply)
         channels = {f"S{int(n) + 1}": net for n, net in zip(numbers, inputs, strict=True)}
         lines = {f"A{k}": f"MUX_{k}" for k in (0, 1, 2)}
-        yield part("U", "multiplexer", **channels, **lines, D="MUX", EN="3V3", VDD="3V3", GND="GND")
+        yield part("U", "multiplexer", **channels, **lines, D="MUX", EN="3V3", VDD="3V3", VSS="GND", GND="GND")
         yield two("C", "decoupling", "100 nF", "3V3", "GND")
     group = "connector and test points"
     yield part("J", "connector", **{f"_{k}": net for k, (net, _) in enumerate(WIRES, 1)})

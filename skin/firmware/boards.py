@@ -30,18 +30,18 @@ BOARD_FACTS: dict[str, BoardFacts] = {
         "wire 3.3 V to AREF; its clock is a ceramic resonator",
     ),
     "nano-every": BoardFacts(
-        *("Arduino Nano Every", "arduino:megaavr:nona4809", 5.0, "5V", 30_000, "200, an estimate"),
+        *("Arduino Nano Every", "arduino:megaavr:nona4809", 5.0, "5V", 30_000, "200, not tried"),
         "wire 3.3 V to AREF; its clock is the controller's own oscillator",
     ),
     "pico": BoardFacts(
-        *("Raspberry Pi Pico", "rp2040:rp2040:rpipico", 3.3, "VBUS", 100, "200, at most about 500: an estimate"),
+        *("Raspberry Pi Pico", "rp2040:rp2040:rpipico", 3.3, "VBUS", 100, "200, at most about 500: not tried"),
         "has three channels: an analog multiplexer brings the six to one of them",
     ),
     "teensy": BoardFacts(
-        *("Teensy 4.0", "teensy:avr:teensy40", 3.3, "VIN", 100, "200, at most 1000: an estimate"),
+        *("Teensy 4.0", "teensy:avr:teensy40", 3.3, "VIN", 100, "200, at most 1000: not tried"),
         "its pins do not stand more than 3.3 V",
     ),
-    "esp32": BoardFacts("ESP32 DevKit", "esp32:esp32:esp32", 3.3, "VIN", 100, "40, an estimate", "", False),
+    "esp32": BoardFacts("ESP32 DevKit", "esp32:esp32:esp32", 3.3, "VIN", 100, "40, not tried", "", False),
 }
 
 

@@ -6,6 +6,7 @@ import re
 import shutil
 import xml.etree.ElementTree as ET
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from coneskin.cli import main
 from coneskin.geometry.frustum import Frustum
 from coneskin.scene.reader import parse_scene
+from coneskin.skin.electronics import Electronics
 from coneskin.skin.firmware.board_circuit import board_circuit, part_catalog
 from coneskin.skin.firmware.boards import BOARD_FACTS, BUILT_IN, boards, converters, firmware_folder
 from coneskin.skin.sensor import Sensor
@@ -233,3 +235,18 @@ def test_without_a_compiler_it_says_what_to_install(sensor_file, monkeypatch, ca
     monkeypatch.setenv("PATH", "")
     assert write(sensor_file, "--board", "pico", "--flash", "/dev/ttyNONE")[0] == 1
     assert "install arduino-cli with the core of rp2040:rp2040:rpipico" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("board", "converter"), [("pico", BUILT_IN), ("uno", "ads1115"), ("uno", "ltc1867")])
+def test_pins_have_the_numbers_of_their_footprints(board, converter):
+    sensor = Sensor(Frustum(0.0375, 0.0375, 0.24, 6.1), electronics=replace(Electronics(), supply_volts=2.048))
+    circuit, catalog = board_circuit(board, sensor, converter), part_catalog()
+    netlist = circuit.kicad_netlist()
+    for name, part, _, _, pins in circuit.components:
+        numbers = re.findall(rf'\(ref "{re.escape(name)}"\) \(pin "([^"]+)"\)', netlist)
+        assert len(numbers) == len({*numbers}) >= len(pins)
+        if len(pins) > 2 and part != "connector":
+            assert {*pins} <= {*catalog[part]["pins"]}
+            assert all(number.isdecimal() for number in numbers)
+            assert catalog[part]["pins_source"]
+    assert '(ref "U1") (value "Analog Devices LT3045EMSE#PBF") (footprint "Package_SO:MSOP-12' in netlist

@@ -94,7 +94,8 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
     three = 3.3 * (1.0 + 0.015 * rng.uniform(-1, 1))
     supply = parts.supply_volts * (1.0 + 0.01 * _drawn(rng, limits["regulator"]["error_percent"]))
     bias = parts.current_zero / 3.3 * SENSE_GAIN * circuit.shunt_ohms * three
-    leak = 1e-9 * 10 ** rng.uniform(-1.5, 0.0, 4) * (limits["clamp"]["leak_na"][1] + 2.0 * switch["leak_na"][1])
+    mux = limits["multiplexer"]["leak_na"][1] if circuit.board.common else 0.0
+    leak = 1e-9 * 10 ** rng.uniform(-1.5, 0.0, 4) * (limits["clamp"]["leak_na"][1] + 2.0 * switch["leak_na"][1] + mux)
     signs = rng.choice((-1.0, 1.0), 4)
     drift = rng.uniform(-1, 1) * limits["regulator"]["drift_ppm_per_k"][1] * 1e-6
     values = {"cable": length, "offset_uv": 1e6 * amplifier, "switch": float(on.mean()), "leak_na": 1e9 * leak.max()}
