@@ -234,7 +234,7 @@ class AxisCandidate:
     cones: tuple[InfiniteCone, ...]
 
 
-def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
+def _find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
     """Find the axes about which a profile is worth measuring, without duplicates.
 
     Args:
@@ -369,4 +369,4 @@ def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]
     if weights is not None:
         weights.check_place(hull.points)
     progress("looking for axes")
-    return SampledLink(mesh, rays, hull, counted, weights, find_axis_candidates(hull))
+    return SampledLink(mesh, rays, hull, counted, weights, _find_axis_candidates(hull))

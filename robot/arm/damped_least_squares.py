@@ -30,7 +30,7 @@ SINGULAR_DAMPING = 0.05**2
 SINGULAR_BELOW = 0.1**2
 
 
-def damping_squared(columns: Sequence[Vector]) -> float:
+def _damping_squared(columns: Sequence[Vector]) -> float:
     """Return the square of the damping for a point with these Jacobian columns [m^2]."""
     if len(columns) == 1:
         smallest = dot(columns[0], columns[0]) + DAMPING_FLOOR
@@ -62,7 +62,7 @@ def damped_speeds(points: Sequence[tuple[Sequence[Vector], Vector]]) -> tuple[li
     joints = range(len(points[0][0]))
     if not joints:
         return [], DAMPING_FLOOR
-    damping = max(damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)]) for columns, _ in points)
+    damping = max(_damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)]) for columns, _ in points)
     normal = [[sum(dot(c[i], c[j]) for c, _ in points) + damping * (i == j) for j in joints] for i in joints]
     along = [[dot(column, v) for column in columns] for columns, v in points]
     wanted = [sum(row[i] for row in along) for i in joints]

@@ -385,8 +385,8 @@ class SceneSolver:
         found = _totals(gram.tolist(), charges, x, y)
         one_less = _totals(less.tolist(), charges, x, y)
         two_less = _totals((less - before.dot(before.T)).tolist(), charges, x, y) if order > 1 else one_less
-        change = solution_change(found, one_less, self._units)
-        earlier = solution_change(one_less, two_less, self._units)
+        change = _solution_change(found, one_less, self._units)
+        earlier = _solution_change(one_less, two_less, self._units)
         ratio = min(max(decay, change / earlier if change < earlier else decay), 0.9)
         rest = (
             (_SAFETY_FACTOR if order > 1 else 2.0 * _SAFETY_FACTOR)
@@ -399,7 +399,7 @@ class SceneSolver:
         return Coupling(*np.array([*numbers, max(rest, least_error)]).reshape(7, 1))
 
 
-def solution_change(one: tuple[float, ...], other: tuple[float, ...], units: tuple[float, ...]) -> float:
+def _solution_change(one: tuple[float, ...], other: tuple[float, ...], units: tuple[float, ...]) -> float:
     """Return how far apart the six numbers of two solutions are, as `Coupling.error` counts it.
 
     Args:

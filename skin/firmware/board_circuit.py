@@ -114,12 +114,12 @@ class BoardCircuit(NamedTuple):
             "limits not sourced",
         )
         rows.writerow(columns)
-        own = unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
+        own = _unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
         rows.writerow((1, "A1", self.facts.title, *[""] * 5, own))
         for (part, value), names in alike.items():
             row = catalog[part]
             told = row["what"], value, row["number"], row["second"], f"{len(names) * row['price']:.1f}", row["source"]
-            rows.writerow((len(names), " ".join(names), *told, unsourced_limits(row)))
+            rows.writerow((len(names), " ".join(names), *told, _unsourced_limits(row)))
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
@@ -184,7 +184,7 @@ def value_text(value: float | int | list[float]) -> str:
     return f"{value:.10g}"
 
 
-def ohms_text(ohms: float) -> str:
+def _ohms_text(ohms: float) -> str:
     """Return a resistance with its unit, as in "10 kohm"."""
     for unit, name in ((1e6, "Mohm"), (1e3, "kohm")):
         if ohms >= unit:
@@ -267,7 +267,7 @@ def part_catalog() -> dict[str, Any]:
     return tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
 
 
-def unsourced_limits(row: Mapping[str, Any]) -> str:
+def _unsourced_limits(row: Mapping[str, Any]) -> str:
     """Return the limits in a table of parts.toml that no document was found for, by their names."""
     return " ".join(name for name, where in row.get("sources", {}).items() if "not sourced" in where)
 
@@ -297,7 +297,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     else:
         unused = {"ILIM": "GND", "PGFB": "5V"}  # no limit of the current, no quick start
         yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND", **unused)
-        yield two("R", "precise", ohms_text(1e4 * parts.supply_volts), "SET", "GND")
+        yield two("R", "precise", _ohms_text(1e4 * parts.supply_volts), "SET", "GND")
         yield two("C", "decoupling", "4.7 uF", "SET", "GND")
     yield two("C", "decoupling", "10 uF", "REG", "GND")
     yield two("R", "precise" if shunt >= _LEAST_CHIP_SHUNT else "low_shunt", f"{shunt:.3g} ohm", "REG", "RAIL")
@@ -326,11 +326,11 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         group = f"electrode {e}"
         yield two("FB", "bead", "", f"DRIVE_{e}", f"E_{e}")
         yield two("C", "filter", "220 pF", f"E_{e}", "GND")
-        yield two("R", "precise", ohms_text(parts.input_ohms), f"S_{e}", "GND")
+        yield two("R", "precise", _ohms_text(parts.input_ohms), f"S_{e}", "GND")
         yield two("R", "resistor", "1 kohm", f"S_{e}", f"ADC_{e}")
         yield two("C", "filter", "470 pF", f"ADC_{e}", "GND")
         if e in "CD":
-            yield two("R", "precise", ohms_text(circuit.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
+            yield two("R", "precise", _ohms_text(circuit.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
     group = "converter"
     inputs = [f"ADC_{name}" for name in "ABCDIS"]
     if converter is not None and converter.pull_down:

@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "@SENSOR is the number of the sensor touched; without it, the first"
     )
     form = "[SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]"
-    add("--touch", type=_argument(parse_press), metavar=form, help=help_text, **many)
+    add("--touch", type=_argument(_parse_press), metavar=form, help=help_text, **many)
     help_text = "read touches from a file, one a line as --touch has them; # comments"
     add("--script", type=Path, metavar="FILE", help=help_text)
     help_text = (
@@ -291,13 +291,13 @@ def _read_script(path: Path) -> list[tuple[str, ScriptedTouch]]:
     for number, line in enumerate(lines, 1):
         if text := line.partition("#")[0].strip():
             try:
-                presses.append(parse_press(text))
+                presses.append(_parse_press(text))
             except SensorError as error:
                 raise SensorError(f"{path}, line {number}: {error}") from error
     return presses
 
 
-def parse_press(text: str) -> tuple[str, ScriptedTouch]:
+def _parse_press(text: str) -> tuple[str, ScriptedTouch]:
     """Read [SHAPE:]START_S:END_S:U_MM:PHI_DEG[:FORCE_N][@SENSOR]: the shape, and its first touch.
 
     U_MM and PHI_DEG may each be FROM..TO, between which the touch slides. The touch names the sensor by its number.

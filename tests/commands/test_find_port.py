@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.commands.find_port import await_port, port_trouble, stable_name
+from coneskin.commands.find_port import _await_port, _port_trouble, _stable_name
 from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import PortFacts
 
@@ -17,7 +17,7 @@ A_ELSEWHERE = A._replace(device="/dev/ttyUSB2")
 def found(*lists: list[PortFacts], timeout: float = 60.0) -> tuple[PortFacts, list[str]]:
     said: list[str] = []
     left, now = iter(lists), iter(range(100))
-    port = await_port(lambda: next(left, lists[-1]), said.append, timeout, lambda: float(next(now)), lambda _: None)
+    port = _await_port(lambda: next(left, lists[-1]), said.append, timeout, lambda: float(next(now)), lambda _: None)
     return port, said
 
 
@@ -58,12 +58,12 @@ def test_it_gives_up_with_advice() -> None:
 def test_a_port_that_is_not_permitted_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     port = tmp_path / "ttyUSB0"
     port.touch()
-    assert port_trouble(str(port)) == ""
+    assert _port_trouble(str(port)) == ""
     monkeypatch.setattr(os, "access", lambda *_: False)
-    assert port_trouble(str(port)) == (
+    assert _port_trouble(str(port)) == (
         f"{port}: not permitted; run `sudo usermod -aG {port.group()} $USER`, and log in again"
     )
-    assert port_trouble(str(tmp_path / "none")) == f"{tmp_path / 'none'}: no such port"
+    assert _port_trouble(str(tmp_path / "none")) == f"{tmp_path / 'none'}: no such port"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links there need rights")
@@ -71,7 +71,7 @@ def test_the_name_that_stays_is_preferred(tmp_path: Path) -> None:
     port, folder = tmp_path / "ttyUSB0", tmp_path / "by-id"
     port.touch()
     folder.mkdir()
-    assert stable_name(str(port), folder) == str(port)
+    assert _stable_name(str(port), folder) == str(port)
     (folder / "usb-FTDI_A1-if00").symlink_to(port)
-    assert stable_name(str(port), folder) == str(folder / "usb-FTDI_A1-if00")
-    assert stable_name(str(port), tmp_path / "none") == str(port)
+    assert _stable_name(str(port), folder) == str(folder / "usb-FTDI_A1-if00")
+    assert _stable_name(str(port), tmp_path / "none") == str(port)

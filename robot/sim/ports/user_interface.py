@@ -33,7 +33,7 @@ EXTERNAL_CONTROL = "# script of the node External Control"
 
 
 @dataclass(frozen=True, slots=True)
-class ProgramFile:
+class _ProgramFile:
     """Program that is loaded."""
 
     name: str  #: of its file, with the extension
@@ -92,7 +92,7 @@ class ProgramFolder:
             raise FileNotFoundError(name)
         return path
 
-    def load(self, name: str) -> ProgramFile:
+    def load(self, name: str) -> _ProgramFile:
         """Return a program.
 
         Raises:
@@ -111,7 +111,7 @@ class ProgramFolder:
             )
         assert self.root is not None
         shown = f"{_PROGRAM_ROOTS[1]}{path.relative_to(self.root).as_posix()}"
-        return ProgramFile(path.name, shown, _program_text(path.name, read_file(source, _MAX_PROGRAM_SIZE)))
+        return _ProgramFile(path.name, shown, _program_text(path.name, read_file(source, _MAX_PROGRAM_SIZE)))
 
     def has(self, name: str) -> bool:
         """Return whether there is such a file."""
@@ -205,7 +205,7 @@ class UserInterface:
         options = controller.options
         self.controller = controller
         self.folder = ProgramFolder(options.programs)
-        self.loaded = ProgramFile("play.script", "play.script", options.program) if options.program else None
+        self.loaded = _ProgramFile("play.script", "play.script", options.program) if options.program else None
         self.operational_mode = NO_MODE
         self.user_role = "PROGRAMMER"
         self.messages: deque[str] = deque(maxlen=_MAX_MESSAGES)

@@ -42,8 +42,8 @@ def run(args: argparse.Namespace) -> int:
     if args.list:
         return _list(find_ports(), args.json)
     say = partial(print_line, file=sys.stderr)
-    port = await_port(find_ports, say, args.timeout_s)
-    trouble, name = port_trouble(port.device), stable_name(port.device)
+    port = _await_port(find_ports, say, args.timeout_s)
+    trouble, name = _port_trouble(port.device), _stable_name(port.device)
     if args.json:
         print(json.dumps({"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}))
     else:
@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _list(ports: Sequence[PortFacts], as_json: bool) -> int:
     """List the ports with what stands against their use; return 0 where one can be used."""
-    rows = [(port, port_trouble(port.device)) for port in ports]
+    rows = [(port, _port_trouble(port.device)) for port in ports]
     for port, trouble in rows:
         if as_json:
             facts = {"device": port.device, "description": port.description, "hardware": port.hardware}
@@ -67,7 +67,7 @@ def _list(ports: Sequence[PortFacts], as_json: bool) -> int:
     return 0 if any(not trouble for _, trouble in rows) else 1
 
 
-def await_port(
+def _await_port(
     look: Callable[[], Sequence[PortFacts]],
     say: Callable[[str], None],
     timeout: float,
@@ -118,7 +118,7 @@ def await_port(
     )
 
 
-def stable_name(device: str, folder: Path = _BY_ID) -> str:
+def _stable_name(device: str, folder: Path = _BY_ID) -> str:
     """Return a name of a port that stays when it is plugged in elsewhere; the device itself where there is none."""
     try:
         links = sorted(folder.iterdir())
@@ -127,7 +127,7 @@ def stable_name(device: str, folder: Path = _BY_ID) -> str:
     return next((str(link) for link in links if link.resolve() == Path(device).resolve()), device)
 
 
-def port_trouble(device: str) -> str:
+def _port_trouble(device: str) -> str:
     """Return why this user may not use a port, and what to do; empty where nothing stands against it."""
     if os.name != "posix" or os.access(device, os.R_OK | os.W_OK):
         return ""

@@ -11,8 +11,8 @@ from coneskin.robot.arm.damped_least_squares import (
     DAMPING_FLOOR,
     SINGULAR_BELOW,
     SINGULAR_DAMPING,
+    _damping_squared,
     damped_speeds,
-    damping_squared,
 )
 from coneskin.robot.reaction.retreat import MIN_PROGRESS
 
@@ -27,7 +27,7 @@ COLUMNS = st.lists(COLUMN, min_size=1, max_size=6)
 def test_it_is_the_damped_least_squares_of_numpy(columns: list[Vector], v: Vector) -> None:
     jacobian = np.array(columns).T
     n = len(columns)
-    damping = math.sqrt(damping_squared(columns))
+    damping = math.sqrt(_damping_squared(columns))
     stacked = np.vstack([jacobian, damping * np.eye(n)])
     wanted = np.linalg.lstsq(stacked, np.array([*v, *[0.0] * n]), rcond=None)[0]
     # normal equations: the condition number squared, at most 1e7 here
@@ -51,7 +51,7 @@ def test_joint_speeds_stay_bounded_near_any_singularity(columns: list[Vector], v
 def test_damping_rises_exactly_where_the_smallest_singular_value_falls(columns: list[Vector]) -> None:
     n = min(len(columns), 3)
     smallest = np.linalg.svd(np.array(columns).T, compute_uv=False)[n - 1] ** 2
-    damping = damping_squared(columns)
+    damping = _damping_squared(columns)
     assert DAMPING_FLOOR <= damping <= DAMPING_FLOOR + SINGULAR_DAMPING
     if smallest > 3.0 * SINGULAR_BELOW:
         assert damping == DAMPING_FLOOR

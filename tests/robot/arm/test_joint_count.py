@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.damped_least_squares import damped_speeds, damping_squared
+from coneskin.robot.arm.damped_least_squares import _damping_squared, damped_speeds
 from coneskin.robot.arm.kinematics import flange_jacobian, forward, link_poses, place_point
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, skeleton
@@ -50,7 +50,7 @@ def test_damped_speeds_are_those_of_numpy(posed, wanted):
     arm, q = posed
     columns = place_point(arm, q, arm.joints, (0.1, 0.2, 0.3)).columns
     speeds, damping = damped_speeds([(columns, wanted)])
-    assert damping == damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)])
+    assert damping == _damping_squared([c for c in columns if any(c)] or [(0.0, 0.0, 0.0)])
     j = np.array(columns).T
     expected = np.linalg.solve(j.T @ j + damping * np.eye(arm.joints), j.T @ np.array(wanted))
     # the damping of 1 mm against lengths of metres: a condition of 1e7 leaves half of the digits

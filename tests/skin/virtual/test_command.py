@@ -41,10 +41,10 @@ def run(*words: str) -> int:
 def test_a_touch_is_read_in_millimetres_and_degrees():
     assert command._parse_touch("1:1.5:200:90") == ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2)
     assert command._parse_touch("1:1.5:200:90:7").force == 7.0
-    assert command.parse_press("1:1.5:200:90") == ("finger", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
-    assert command.parse_press("grip:1:1.5:200:90") == ("grip", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
+    assert command._parse_press("1:1.5:200:90") == ("finger", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
+    assert command._parse_press("grip:1:1.5:200:90") == ("grip", ScriptedTouch(1.0, 1.5, 0.2, math.pi / 2))
     with pytest.raises(SensorError, match="must be one of finger, palm, fingers, grip, seam, got 'fist'"):
-        command.parse_press("fist:1:1.5:200:90")
+        command._parse_press("fist:1:1.5:200:90")
 
 
 @pytest.mark.parametrize(("shape", "contacts"), [("finger", 1), ("palm", 1), ("fingers", 3), ("grip", 2), ("seam", 2)])

@@ -14,7 +14,7 @@ from coneskin.skin.detection.frame.reading import TouchReading
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual import scripted_touch
-from coneskin.skin.virtual.command import parse_press
+from coneskin.skin.virtual.command import _parse_press
 from coneskin.skin.virtual.imperfections import ContactLaw, Foam, Imperfections
 from coneskin.skin.virtual.scripted_touch import TOUCH_SHAPES, ScriptedTouch, across_seam
 from coneskin.skin.virtual.skin import VirtualSkin
@@ -93,15 +93,15 @@ def test_a_slide_that_cannot_be(change, message):
 
 
 def test_it_is_typed_as_a_way():
-    assert parse_press("1:3:100..300:90") == ("finger", ScriptedTouch(1.0, 3.0, 0.1, math.pi / 2, slide_u=0.2))
-    shape, touch = parse_press("grip:1:3:300..100:90..45:7@2")
+    assert _parse_press("1:3:100..300:90") == ("finger", ScriptedTouch(1.0, 3.0, 0.1, math.pi / 2, slide_u=0.2))
+    shape, touch = _parse_press("grip:1:3:300..100:90..45:7@2")
     assert (shape, touch.force, touch.sensor) == ("grip", 7.0, "2")
     assert touch.place_at(3.0) == pytest.approx((0.1, math.pi / 4))
     for text in ("1:3:100..:90", "1:3:..100:90", "1:3:100..200..300:90", "1:3:100...200:90", "1..2:3:100:90"):
         with pytest.raises(SensorError, match=r"a touch must be START_S.*; where it slides, .* is FROM\.\.TO"):
-            parse_press(text)
+            _parse_press(text)
     with pytest.raises(SensorError, match="must have an end"):
-        parse_press("1:inf:100..200:90")
+        _parse_press("1:inf:100..200:90")
 
 
 @pytest.mark.parametrize("shape", TOUCH_SHAPES)
