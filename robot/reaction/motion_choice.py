@@ -14,7 +14,7 @@ from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace
 
 from .contact_supervision import clamped, opposed
-from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, progress_of, retreat_step
+from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from .types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 
 _DAMPING_TIME = 0.05  # s; a person's push rises in 50 ms and more
@@ -80,7 +80,7 @@ class _AdmittanceMotion:
         reaction = self._reaction
         last, progress = self.last, self.last.progress
         if last.plan is not None:
-            progress += max(0.0, progress_of(last.plan, state.q))
+            progress += max(0.0, last.plan.place(state.q)[1])
         if not contacts:
             return Done("the touch is over", progress, complete=True)
         if not progress < reaction.distance - DISTANCE_TOLERANCE:

@@ -67,6 +67,12 @@ class RetreatPlan:
     space: Workspace | None = None
     sweep: ArmSweep | None = None
 
+    def place(self, q: Joints) -> tuple[list[PlacedPoint], float]:
+        """Return where the touched points are at joint positions [rad], and how far the farthest has come [m]."""
+        placed = [place_point(self.model, q, track.link, track.point) for track in self.tracks]
+        made = [dot(minus(at.point, track.start), track.away) for track, at in zip(self.tracks, placed, strict=True)]
+        return placed, max(made)
+
 
 def plan_retreat(
     model: ArmModel,
@@ -124,8 +130,7 @@ def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
     q, qd = state.q, state.qd or (0.0,) * len(state.q)
     if not math.isfinite(sum(q)):
         return Done(f"joint positions must be finite, got {q} rad")
-    placed = _placed(plan, q)
-    progress = _progress(plan, placed)
+    placed, progress = plan.place(q)
     speeds, away, damping = _solve(plan, placed, ())
     left = reaction.distance - progress
     if not left > DISTANCE_TOLERANCE:
@@ -204,19 +209,6 @@ def _solve(plan: RetreatPlan, placed: Sequence[PlacedPoint], locked: Sequence[in
     for i, value in zip(free, some, strict=True):
         speeds[i] = value
     return speeds, made / len(points), damping
-
-
-def _placed(plan: RetreatPlan, q: Joints) -> list[PlacedPoint]:
-    return [place_point(plan.model, q, track.link, track.point) for track in plan.tracks]
-
-
-def _progress(plan: RetreatPlan, placed: Sequence[PlacedPoint]) -> float:
-    return max(dot(minus(at.point, track.start), track.away) for track, at in zip(plan.tracks, placed, strict=True))
-
-
-def progress_of(plan: RetreatPlan, q: Joints) -> float:
-    """Return how far the touched points have come since the plan was made [m], the farthest, at joint positions."""
-    return _progress(plan, _placed(plan, q))
 
 
 def _why_not(plan: RetreatPlan, locked: Sequence[int], away: float, damping: float) -> str:

@@ -18,7 +18,7 @@ _MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away
 _LAG_TIME: Final = 0.02  # s for which they must be as late
 
 
-class StateStamp(NamedTuple):
+class _StateStamp(NamedTuple):
     """What the newest state of a controller shows, and those before it have shown.
 
     Attributes:
@@ -57,7 +57,7 @@ class StateAge:
     """
 
     def __init__(self, limit: float) -> None:
-        self.newest = StateStamp()
+        self.newest = _StateStamp()
         self._limit = limit
         #: smallest differences of the clocks in the last window and in this one, controller's time at its begin [s]
         self._window = math.inf, math.inf, -math.inf
@@ -84,7 +84,7 @@ class StateAge:
             fresh_at, lag = host, host - measured_at
             late = min(late, host) if lag > _MAX_SUPERVISION_LAG else math.inf
             very_late = min(very_late, host) if lag > self._limit else math.inf
-        self.newest = StateStamp(controller, fresh, fresh_at, measured_at, stepped, late, very_late)
+        self.newest = _StateStamp(controller, fresh, fresh_at, measured_at, stepped, late, very_late)
         return measured_at
 
     def silent(self, now: float, limit: float = 0.0) -> bool:

@@ -18,7 +18,7 @@ import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.arm.models import UR_CURRENTS
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.reaction.types import ContactOnLink
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.reader import parse_scene
@@ -76,7 +76,7 @@ def moving(session, goal=FAR):
 def push_joints(controller, scene, u=0.13, phi=1.55, force=100.0):
     """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them."""
     at = place_on_arm(scene)[0]
-    turns = push_torque(at.model, tuple(controller.state()["q"]), ContactOnLink(at.link, *at.place(u, phi)))
+    turns = _push_torque(at.model, tuple(controller.state()["q"]), ContactOnLink(at.link, *at.place(u, phi)))
     for joint, (turn, each) in enumerate(zip(turns, UR_CURRENTS.torque_per_ampere, strict=True), 1):
         controller.call(f"resist {joint} {-force * turn / each:.4f}")
 

@@ -23,7 +23,7 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import GuardedSensor
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.rules import Rule, RuleSet
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
@@ -197,7 +197,7 @@ class CollisionRig:
         for item in self.pressing:
             if item.force > 0.0:
                 place = ContactOnLink(item.link, item.point, item.normal)
-                pushed = push_torque(self._model, tuple(q), place)  # type: ignore[arg-type]
+                pushed = _push_torque(self._model, tuple(q), place)  # type: ignore[arg-type]
                 torque = [a + item.force * b for a, b in zip(torque, pushed, strict=True)]
         return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 

@@ -19,7 +19,7 @@ from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.contact import Contact, GuardedSensor
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 from coneskin.robot.reaction.rules import Rule, RuleSet
@@ -174,7 +174,7 @@ class GuardRig:
         for item in self._pushes:
             if item.start <= self.now - 100.0 < item.end:
                 place = ContactOnLink(LINK, CONE.point(item.u, item.phi), CONE.normal(item.phi))
-                pushed = push_torque(MODEL, q, place)  # type: ignore[arg-type]
+                pushed = _push_torque(MODEL, q, place)  # type: ignore[arg-type]
                 torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
         return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 

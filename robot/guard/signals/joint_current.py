@@ -113,7 +113,7 @@ class ResistanceMonitor:
         left, forces = list(torque), dict.fromkeys(self._pushes, 0.0)
         for _ in range(_FIT_ROUNDS if len(forces) > 1 else 1):
             for number, contact in self._pushes.items():
-                push = push_torque(self._model, q, contact)
+                push = _push_torque(self._model, q, contact)
                 weighted = [g / (w * w) for g, w in zip(push, self._tolerance, strict=True)]
                 square = sum(a * b for a, b in zip(push, weighted, strict=True))
                 if square <= 0.0:
@@ -126,7 +126,7 @@ class ResistanceMonitor:
         return tuple(left)
 
 
-def push_torque(model: ArmModel, q: Joints, contact: ContactOnLink) -> Joints:
+def _push_torque(model: ArmModel, q: Joints, contact: ContactOnLink) -> Joints:
     """Return the torques on the joints of a push of 1 N on a touch [N m], at joint positions q [rad]."""
     _, normal, columns = place_point(model, q, contact.link, contact.point, contact.normal)
     return (*(-dot(column, normal) for column in columns), *[0.0] * (model.joints - contact.link))

@@ -29,7 +29,7 @@ from coneskin.robot.arm.workspace import (
     reach,
     skeleton,
 )
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.reaction.motion_choice import _AdmittanceMotion
 from coneskin.robot.reaction.retreat import RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
@@ -319,7 +319,7 @@ def test_an_arm_that_something_else_has_moved_so_far_gets_no_step() -> None:
 
 def test_giving_way_is_bounded_too() -> None:
     motion = _AdmittanceMotion(arm_model("UR10e"), ArmState(0.0, STRETCHED), Reaction("comply"))
-    pushed = push_torque(arm_model("UR10e"), STRETCHED, NEAR_SHOULDER)  # by 1 N
+    pushed = _push_torque(arm_model("UR10e"), STRETCHED, NEAR_SHOULDER)  # by 1 N
     torque = tuple(1000.0 * each for each in pushed)
     for time in (0.0, 0.1):
         assert not isinstance(motion.update(ArmState(time, STRETCHED, torque=torque), [NEAR_SHOULDER]), Done)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.arm.workspace import Workspace, skeleton
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
@@ -39,7 +39,7 @@ def ramped(qd, wanted, most):
 
 def pushed(q, force=1000.0):
     """Torques on the joints of a push on the forearm [N m]; so strong a one bounds nothing."""
-    return tuple(force * turn for turn in push_torque(ARM, q, FOREARM))
+    return tuple(force * turn for turn in _push_torque(ARM, q, FOREARM))
 
 
 def follow(step, q=Q, time=0.0, longest=5.0):

@@ -27,7 +27,7 @@ from coneskin.robot.driver.values import (
 )
 from coneskin.robot.guard.core import GuardCore
 from coneskin.robot.guard.phase import Phase
-from coneskin.robot.guard.signals.joint_current import push_torque
+from coneskin.robot.guard.signals.joint_current import _push_torque
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, encode_loss
 from coneskin.robot.reaction.types import ContactOnLink
 from coneskin.robot.sim.mock_arm import SLIDER, CompanionProcesses, MockArm
@@ -521,7 +521,7 @@ class GuardWorld:
         for shows, at in zip((self.wrong.skin, self.wrong.other), _parts(self.settings)[1], strict=False):
             if shows != "free":
                 assert at.model is not None
-                pushed = push_torque(at.model, q, ContactOnLink(at.link, *at.place(*_PLACE)))  # type: ignore[arg-type]
+                pushed = _push_torque(at.model, q, ContactOnLink(at.link, *at.place(*_PLACE)))  # type: ignore[arg-type]
                 torque = [a + _PUSH * b for a, b in zip(torque, pushed, strict=True)]
         return [-a / b for a, b in zip(torque, UR_CURRENTS.torque_per_ampere, strict=True)]
 

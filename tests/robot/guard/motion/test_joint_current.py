@@ -10,7 +10,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.joint_current import (
     OutsideTorque,
     ResistanceMonitor,
-    push_torque,
+    _push_torque,
 )
 from coneskin.robot.reaction.types import ContactOnLink, Reaction
 from tests.support.guard_rig import CONE, LINK, MODEL, START_Q, GuardRig, touch
@@ -29,7 +29,7 @@ def state(torque, target=ZEROS):
 
 
 def push(force, contact=TOUCH):
-    return [force * turn for turn in push_torque(MODEL, Q, contact)]
+    return [force * turn for turn in _push_torque(MODEL, Q, contact)]
 
 
 class Monitored:
