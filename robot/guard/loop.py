@@ -80,22 +80,13 @@ class GuardPorts:
 
 
 class _Outbox:
-    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder.
-
-    Args:
-        ports: of the loop.
-        clock: monotonic seconds.
-
-    Attributes:
-        sent: blocks of the commands, of the times at which they were sent.
-        events: of the core.
-    """
+    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder."""
 
     __slots__ = ("_clock", "_ports", "events", "sent")
 
     def __init__(self, ports: GuardPorts, clock: Callable[[], float]) -> None:
         self._ports, self._clock = ports, clock
-        self.sent: list[Block] = []
+        self.sent: list[Block] = []  # commands, of the times at which they were sent
         self.events: list[GuardEvent] = []
 
     def append(self, output: Output, /) -> None:

@@ -19,25 +19,15 @@ _LAG_TIME: Final = 0.02  # s for which they must be as late
 
 
 class _StateStamp(NamedTuple):
-    """What the newest state of a controller shows, and those before it have shown.
+    """What the newest state of a controller shows, and those before it have shown."""
 
-    Attributes:
-        controller_time: its own time [s].
-        fresh: it was a new one.
-        fresh_at: host time of the newest one that was [s].
-        measured_at: host time at which it was measured [s].
-        stepped: by how much the controller's clock had stepped before it, ahead or back [s]. 0 where not.
-        late_since: host time of the first state that came too late to move away by, and all since [s].
-        very_late_since: the same of those that came later than they may [s].
-    """
-
-    controller_time: float = -math.inf
-    fresh: bool = False
-    fresh_at: float = -math.inf
-    measured_at: float = -math.inf
-    stepped: float = 0.0
-    late_since: float = math.inf
-    very_late_since: float = math.inf
+    controller_time: float = -math.inf  # its own [s]
+    fresh: bool = False  # it was a new one
+    fresh_at: float = -math.inf  # host time of the newest one that was [s]
+    measured_at: float = -math.inf  # host time [s]
+    stepped: float = 0.0  # by how much the controller's clock had stepped before it, ahead or back [s]
+    late_since: float = math.inf  # host time of the first that came too late to move away by, as all since [s]
+    very_late_since: float = math.inf  # the same of those that came later than they may [s]
 
 
 class StateAge:

@@ -56,12 +56,6 @@ class PermissibleSpeeds:
     highest: tuple[float, ...] = ()
     between: float = 1.0
 
-    def covers(self, q: Sequence[float]) -> bool:
-        """Tell whether the patches' own curves hold at joint positions [rad]."""
-        if not self.lowest:
-            return False
-        return all(low <= at <= high for low, at, high in zip(self.lowest, q, self.highest, strict=True))
-
 
 class SurfaceSpeeds:
     """Speeds of the surfaces of one arm, held against those that are permissible."""
@@ -81,7 +75,8 @@ class SurfaceSpeeds:
         if leading <= 0.0:
             return 0.0, ""
         speeds, worst, name = self._speeds, 0.0, ""
-        inside = speeds.covers(q)
+        within = zip(speeds.lowest, q, speeds.highest, strict=True) if speeds.lowest else ()
+        inside = bool(speeds.lowest) and all(low <= at <= high for low, at, high in within)
         for link, rows in self._links:
             velocity, turn = link_motion(self._model, q, qd, link)
             flow = *velocity, *turn
