@@ -349,14 +349,7 @@ class Developable(PlacedFrustum):
 
 
 def _bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool = False) -> tuple[Bend, ...]:
-    """Return the bends between two azimuths [rad], those at the edges cut.
-
-    Args:
-        bends: from phi = 0 on.
-        phi1: first azimuth, not below 0.
-        phi2: last azimuth.
-        around: True where the first bend follows the last one again; else the last one goes on.
-    """
+    """Return the bends between two azimuths [rad], those at the edges cut; beyond the last they repeat, or it does."""
     parts, begin = [], 0.0
     wrap = math.fsum(bend.width for bend in bends)
     beyond = phi2 - wrap
@@ -373,13 +366,7 @@ def _bends_between(bends: Sequence[Bend], phi1: float, phi2: float, around: bool
 
 
 def _frames_along(strips: Sequence[BentStrip], number: Ints, along: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return points of end 1 [m], rulings and normals for many places: shapes (..., 3).
-
-    Args:
-        strips: of a side.
-        number: of the strip of each place, shape (...).
-        along: distance of each place from the first ruling of its strip [m], shape (...).
-    """
+    """Return points of end 1 [m], rulings and normals at places along strips [m], by their numbers: shapes (..., 3)."""
     import numpy as np
 
     at, t, u, n = (np.array([getattr(strip.first, name) for strip in strips])[number] for name in ("at", "t", "u", "n"))
@@ -394,11 +381,7 @@ def _frames_along(strips: Sequence[BentStrip], number: Ints, along: Floats) -> t
 
 
 def _check_bends(bends: Sequence[Bend], wrap: float) -> None:
-    """Check that bends are possible and add up to a wrap [rad].
-
-    Raises:
-        GeometryError: a bend is not finite or turns too far, or they do not add up.
-    """
+    """Check that bends are possible and add up to a wrap [rad]."""
     for bend in bends:
         if not (math.isfinite(bend.width) and bend.width > 0.0 and math.isfinite(bend.turn)):
             raise GeometryError(f"a bend needs a width above 0 rad and a finite turn, got {bend}")

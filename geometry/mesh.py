@@ -25,10 +25,7 @@ from .pose import Pose
 
 
 def _outermost_points(points: Floats) -> Floats:
-    """Return those of points [m], shape (n, 3), that are corners of their hull: as far as all reach, these reach.
-
-    All are returned where the hull has no volume.
-    """
+    """Return those of points [m] that are corners of their hull; all of them where it has no volume."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -53,11 +50,7 @@ class _ColladaAsset:
 
 
 def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
-    """Read unit and up axis of a COLLADA file, whose entities are known to be harmless.
-
-    Raises:
-        MeshError: malformed XML, or a unit that is no length.
-    """
+    """Read unit and up axis of a COLLADA file, whose entities are known to be harmless."""
     asset = _ColladaAsset()
     try:
         root = ElementTree.fromstring(data)
@@ -290,11 +283,7 @@ def make_mesh(
 
 
 def _check_corners(faces: Ints, count: int, source: str) -> None:
-    """Refuse faces that refer to other than so many corners, and no faces at all.
-
-    Raises:
-        MeshError: they do, or there are none.
-    """
+    """Refuse faces that refer to other than so many corners, and no faces at all."""
     if len(faces) == 0:
         raise MeshError(f"{source}: no faces")
     low, high = faces.min(), faces.max()

@@ -108,16 +108,6 @@ class PlacedFrustum:
         """Growth of the mean radius per height above the side."""
         return self.frustum.cos_half_angle
 
-    def mismatch(self, height: float) -> float:
-        """Return how far the parallel side at a height [m] is from being a sector [m]: 0 of a cone."""
-        del height
-        return 0.0
-
-    @property
-    def closing_gap(self) -> float:
-        """Distance between the ends of the arc of end 1 of a full wrap [m]."""
-        return 0.0
-
     @property
     def sharpest_bend(self) -> float:
         """Largest turn of the normal per azimuth; cos a all around a cone."""

@@ -27,12 +27,7 @@ def _expand_xacro(
     arguments: Mapping[str, str] | None = None,
     packages: Mapping[str, str | Path] | None = None,
 ) -> bytes:
-    """Return the URDF that a xacro file describes, in UTF-8; paths of meshes beside it become absolute.
-
-    Raises:
-        MeshError: the file cannot be read, or xacro cannot expand it; the message has xacro's words.
-        MissingExtra: xacrodoc is not installed.
-    """
+    """Return the URDF that a xacro file describes, in UTF-8; paths of meshes beside it become absolute."""
     path = Path(path)
     try:
         from xacrodoc import XacroDoc

@@ -37,9 +37,8 @@ from coneskin.geometry.fit.axis_plan import SheetRequirements
 from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, _find_revolution_axis
 from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
-from coneskin.geometry.fit.cones import LEAST_GAIN, find_cones
+from coneskin.geometry.fit.cones import LEAST_GAIN, FineStage, find_cones
 from coneskin.geometry.fit.fitted_sheet import fitted_sheet
-from coneskin.geometry.fit.plan import FineStage
 from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.ray_casting import RayCaster
@@ -136,9 +135,8 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     best = 0.0
     for packing in packings[:FINE_PACKINGS]:
         made = stage.completed(stage.made(packing))
-        if made is not None:
-            fitted = [fitted_sheet(about, side, 0, hull, FIT_TOLERANCE) for about in made.axes for side in about.sides]
-            best = max(best, sum(sheet.frustum.area for sheet in fitted))
+        fitted = [fitted_sheet(about, side, 0, hull, FIT_TOLERANCE) for about in made for side in about.sides]
+        best = max(best, sum(sheet.frustum.area for sheet in fitted))
     return best / whole, len(axes)
 
 

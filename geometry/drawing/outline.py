@@ -246,8 +246,7 @@ def _corner(before: PathSegment, after: PathSegment, left: float) -> FlatPoint:
     """Return the intersection of two neighbouring segments that are both moved to the left by a distance [m].
 
     With X measured from the common vertex, the points at the distance t to the left of an arc through it with left
-    normal n and curvature k satisfy n.X - k |X|^2 / 2 = t - k t^2 / 2, which is regular for lines. Newton's method
-    solves the two equations.
+    normal n and curvature k satisfy n.X - k |X|^2 / 2 = t - k t^2 / 2, regular for lines: Newton's method solves both.
     """
     x0, y0 = after.start
     curves = []

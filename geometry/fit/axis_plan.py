@@ -7,7 +7,7 @@ other axes take cells of the profile away: those on which a sheet would run into
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,17 +23,9 @@ from .touch_weights import TouchWeights
 def _largest_region(
     good: Bools, rows: int = 1, columns: int = 1, exact: bool = False, worth: Floats | None = None
 ) -> Region | None:
-    """Return the largest rectangle of good cells on a grid whose columns go round.
+    """Return the largest rectangle of good cells on a grid whose columns go round, or the one that is worth most.
 
-    Args:
-        good: True for the cells of the (z, phi) grid that are within the tolerance, shape (k, p).
-        rows: smallest number of rows.
-        columns: smallest number of columns.
-        exact: True to take exactly that many columns.
-        worth: what each cell counts, not negative, shape (k, p); 1 by default.
-
-    Returns:
-        the region, its first column in [0, p), with p columns for a full turn; None where none is large enough.
+    It has ``rows`` and ``columns`` at least, or exactly so many columns; its first column is in [0, p).
     """
     count, around = good.shape
     if columns > around or rows > count:
@@ -321,7 +313,7 @@ def _clashing_cells(
     return clash
 
 
-def kept_clear(profile: RadialProfile, plans: list[AxisPlan], requirements: SheetRequirements) -> RadialProfile:
+def kept_clear(profile: RadialProfile, plans: Sequence[AxisPlan], requirements: SheetRequirements) -> RadialProfile:
     """Return a profile on which no sheet may lie where it would run into those of plans about other axes.
 
     Args:

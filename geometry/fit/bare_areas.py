@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +14,6 @@ from coneskin.geometry.mesh import Mesh
 from .axis_plan import AxisPlan, SheetRequirements, kept_clear, plan_sheets
 from .coarse_packing import AxisSurvey
 from .cone_fit import InfiniteCone
-from .plan import SheetPlan
 from .profile import RadialProfile
 from .surface_samples import SurfaceSamples
 
@@ -108,7 +108,7 @@ class BareTally:
 
 
 def bare_areas(
-    plan: SheetPlan,
+    axes: Sequence[AxisPlan],
     more: AxisPlan | None,
     surveys: list[AxisSurvey],
     hull: SurfaceSamples,
@@ -117,17 +117,17 @@ def bare_areas(
     """Return what a plan leaves bare, by reason, the largest area first.
 
     Args:
-        plan: the sheets.
+        axes: the sheets, by their axes.
         more: a sheet that could be added if one more were allowed; None where it was looked for in vain.
         surveys: of all axes.
         hull: samples of the link.
         requirements: on the sheets.
     """
-    tally = BareTally(hull, _covered(plan.axes, hull, requirements.tolerance))
+    tally = BareTally(hull, _covered(axes, hull, requirements.tolerance))
     take = tally.take
     if more is not None:
-        tally.take_more(plan.count, _covered([more], hull, requirements.tolerance))
-    further, hindered = _further_plans(plan, surveys, requirements)
+        tally.take_more(sum(len(about.sides) for about in axes), _covered([more], hull, requirements.tolerance))
+    further, hindered = _further_plans(axes, surveys, requirements)
     if further is not None and further.area < requirements.least_gain:
         little = "is too small" if requirements.weights is None else "covers too little that counts"
         take(
@@ -148,7 +148,7 @@ def bare_areas(
     return tally.areas
 
 
-def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples, tolerance: float) -> Bools:
+def _covered(plans: Sequence[AxisPlan], hull: SurfaceSamples, tolerance: float) -> Bools:
     """Return whether sheets cover each sample, shape (n,)."""
     covered = np.zeros(len(hull), bool)
     for about in plans:
@@ -158,12 +158,12 @@ def _covered(plans: tuple[AxisPlan, ...] | list[AxisPlan], hull: SurfaceSamples,
 
 
 def _further_plans(
-    plan: SheetPlan, surveys: list[AxisSurvey], requirements: SheetRequirements
+    axes: Sequence[AxisPlan], surveys: list[AxisSurvey], requirements: SheetRequirements
 ) -> tuple[AxisPlan | None, AxisPlan | None]:
     """Return the largest sheet that there is room for, and the largest one if the others took no room."""
     further: AxisPlan | None = None
     hindered: AxisPlan | None = None
-    least, axes = replace(requirements, least_gain=0.0), list(plan.axes)
+    least = replace(requirements, least_gain=0.0)
 
     def larger(profile: RadialProfile, survey: AxisSurvey, known: AxisPlan | None) -> AxisPlan | None:
         found = [*([known] if known else []), *plan_sheets(profile, survey.lines, least, 1)]

@@ -35,17 +35,11 @@ _FIT_ROUNDS = 30  # reweighted solutions
 def _find_revolution_axis(
     samples: SurfaceSamples, start: tuple[Floats, Floats] | None = None, spread: float = 0.0005
 ) -> tuple[Floats, Floats] | None:
-    """Find the axis that most normals meet.
+    """Find the axis that most normals meet: origin [m], in the middle of the points, and unit direction.
 
-    Args:
-        samples: points and normals of the hull.
-        start: origin [m] and direction near the axis; None to begin with equal weights of all normals.
-        spread: distance of a normal line from the axis at which its final weight is a quarter [m]. The first round uses
-            a hundred times that.
-
-    Returns:
-        origin [m], in the middle of the points, and unit direction; None where the normals have no common line (a
-        plane, a box).
+    None where the normals have no common line (a plane, a box). The search begins near ``start``, or with equal weights
+    of all normals. A normal line at the distance ``spread`` [m] has a quarter of the weight in the end; in the first
+    round a hundred times that.
     """
     middle = samples.points.mean(axis=0)
     size = float(np.ptp(samples.points, axis=0).max())
@@ -95,16 +89,8 @@ def _cone_hypotheses(
     """Return rough cones, each of which explains a part of the hull that those before it do not.
 
     Two points with normals give a cylinder, three a cone. A slight cone is close enough to a cylinder as a first guess,
-    while its apex, the intersection of the three tangent planes, is far away and uncertain.
-
-    Args:
-        samples: points and normals of the hull.
-        distance: distance from the side up to which a point counts as explained [m].
-        max_count: number of cones at most.
-        seed: seed of the random numbers.
-
-    Returns:
-        the cones, the one that explains most first; empty where none explains 1.5 % of the hull.
+    while its apex, the intersection of the three tangent planes, is far away and uncertain. A point within ``distance``
+    of the side [m] is explained.
     """
     rng = np.random.default_rng(seed)
     if len(samples) < 24:

@@ -134,12 +134,7 @@ def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[Axis
 
 
 def _side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[SideLine]:
-    """Return the straight sides near which partial wraps are looked for: those of the cones, and frequent radii.
-
-    Args:
-        profile: the hull about the axis.
-        cones: about the same axis.
-    """
+    """Return the straight sides near which partial wraps are looked for: those of the cones, and frequent radii."""
     lines: list[SideLine] = []
     for cone in cones:
         slope = math.tan(cone.half_angle)

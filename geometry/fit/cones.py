@@ -1,25 +1,239 @@
-"""Search for the sheets of a link: the frusta that cover most of it within a tolerance."""
+"""Search for the sheets of a link: the frusta that cover most of it within a tolerance.
+
+The best coarse packings are made again on fine profiles, and completed there. An axis is refined by the centers of its
+slices, which do not depend on the normals of the mesh.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from coneskin.core.arrays import Floats
 from coneskin.geometry.mesh import Mesh
 
-from .axis_plan import AxisPlan, SheetRequirements
+from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, plan_sheets
 from .bare_areas import BareArea, bare_areas, hull_note
 from .candidates import SampledLink, sample_link
-from .coarse_packing import better_surveys, survey_axes
+from .coarse_packing import AxisSurvey, Choice, better_surveys, packings, survey_axes
+from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import MOST_TOLERANCE, FitOptions, check_names
 from .fitted_sheet import FittedSheet, fitted_sheet
-from .plan import FineStage, SheetPlan
+from .profile import AxisFrame, RadialProfile
+from .side import StraightSide, facet_offset
 from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights
+
+
+def refine_axis(profile: RadialProfile, sides: list[StraightSide], tolerance: float, seam: Floats) -> AxisFrame:
+    """Shift and tilt an axis so that the slices under full wraps are centred on it.
+
+    A shift s and a tilt t of the axis appear in the slice at height z as (s + t (z + r dr/dz)) cos(phi), the first
+    harmonic of R(z, phi), for any profile.
+
+    Args:
+        profile: the hull about the axis so far.
+        sides: full wraps about it; only their slices count.
+        tolerance: cells further than twice this from the median of their slice, such as holes, are left out [m].
+        seam: direction of azimuth 0.
+
+    Returns:
+        the refined axis; the given one where the correction exceeds 0.2 rad or is not finite.
+    """
+    heights, levers, harmonics = [], [], []
+    for side in sides:
+        z = profile.z[side.first : side.end]
+        radius = profile.radius[side.first : side.end]
+        middle = np.median(radius, axis=1, keepdims=True)
+        radius = np.where(np.abs(radius - middle) <= 2.0 * tolerance, radius, middle)
+        waves = np.stack([np.cos(profile.phi), np.sin(profile.phi)], axis=1)
+        harmonics.append(radius @ waves * (2.0 / len(profile.phi)))
+        levers.append(z + middle[:, 0] * side.slope)
+        heights.append(z)
+    lever, harmonic = np.concatenate(levers), np.concatenate(harmonics)
+    weights = np.ones(len(lever))
+    solution = np.zeros((2, 2))
+    for _ in range(10):
+        total = float(weights.sum())
+        lm = float(weights @ lever) / total
+        hm = weights @ harmonic / total
+        spread = float(weights @ (lever - lm) ** 2)
+        if spread <= 0.0:
+            return profile.frame
+        tilt = (weights * (lever - lm)) @ (harmonic - hm) / spread
+        solution = np.stack([hm - tilt * lm, tilt])
+        miss = np.linalg.norm(harmonic - solution[0] - lever[:, None] * solution[1], axis=1)
+        scale = max(4.0 * float(np.median(miss)), 1e-3 * tolerance)
+        weights = np.where(miss < scale, (1.0 - (miss / scale) ** 2) ** 2, 0.0)
+    shift, tilt = solution
+    if not np.isfinite(solution).all() or math.hypot(*tilt) > 0.2:
+        return profile.frame
+    columns = profile.frame.columns
+    axis = columns[:, 2] + columns[:, :2] @ tilt
+    origin = profile.frame.origin + columns[:, :2] @ shift
+    return AxisFrame.along(origin, axis / np.linalg.norm(axis), seam)
+
+
+_FINE_GRID = (512, 149)  # slices, and rays in each; odd for the same reason
+_FINE_PACKINGS = 6  # packings made anew on fine profiles
+_LAST_TRIES = 12  # sheets that are tried where no packing is within the tolerance on fine profiles
+_MAX_COMPLETIONS = 3  # further sheets that are tried on fine profiles, where a plan has fewer than it may have
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FineStage:
+    """Where packings are made anew on fine profiles; what is known about an axis without others is kept.
+
+    Attributes:
+        link: the link.
+        surveys: of its axes, as ``survey_axes`` returns them.
+        requirements: on the sheets.
+        alone: coarse plans about each axis by itself, of one sheet, two sheets ... (``plan_sheets``).
+    """
+
+    link: SampledLink
+    surveys: list[AxisSurvey]
+    requirements: SheetRequirements
+    alone: list[list[AxisPlan]] = field(init=False, repr=False)
+    _first: dict[tuple[int, tuple[int, int]], AxisPlan | None] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        most = self.requirements.max_sheets
+        alone = [plan_sheets(one.profile, one.lines, self.loose, most) for one in self.surveys]
+        object.__setattr__(self, "alone", alone)
+
+    @property
+    def loose(self) -> SheetRequirements:
+        """Requirements for coarse profiles, on which a sheet may seem a little worse than it is."""
+        wanted = self.requirements
+        return replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
+
+    def best_plans(self) -> tuple[AxisPlan, ...]:
+        """Return the plans that together cover most, the one that covers most first; none where nothing fits."""
+        best: tuple[AxisPlan, ...] = ()
+        most = 0.0
+        for packing in packings(self.surveys, self.alone, self.loose)[:_FINE_PACKINGS]:
+            plans = self.made(packing)
+            score = sum(plan.score(self.requirements) for plan in plans)
+            if plans and (not best or score > 1.002 * most):
+                best, most = plans, score
+        return self.completed(best)
+
+    def made(self, packing: list[Choice]) -> tuple[AxisPlan, ...]:
+        """Return a packing made anew on fine profiles; nothing where none of it is within the tolerance."""
+        done: list[AxisPlan] = []
+        for choice in sorted(packing, key=lambda choice: -choice.plan.area):
+            plan = self._first_of(choice) if not done else self._beside(choice, done)
+            if plan is not None and (not done or plan.score(self.requirements) > 0.0):
+                done.append(plan)
+        return tuple(sorted(done, key=lambda plan: -plan.area))
+
+    def completed(self, axes: tuple[AxisPlan, ...]) -> tuple[AxisPlan, ...]:
+        """Return plans with further sheets as long as they are allowed and worth it."""
+        while sum(len(about.sides) for about in axes) < self.requirements.max_sheets:
+            further = self.further(axes)
+            if further is None:
+                break
+            axes = (*axes, further)
+        return axes
+
+    def further(self, axes: tuple[AxisPlan, ...]) -> AxisPlan | None:
+        """Return the largest sheet that can be added to plans, made on a fine profile; None where none is worth it.
+
+        Args:
+            axes: plans about axes, made on fine profiles; none for the largest sheet by itself.
+        """
+        least = self.requirements.least_gain if axes else 0.0
+        single = ((plans[0].area, n) for n, plans in enumerate(self.alone) if plans)
+        hopes = sorted((hope for hope in single if hope[0] > least), reverse=True)
+        tries = _MAX_COMPLETIONS if axes else _LAST_TRIES
+        found: list[Choice] = []
+        for hope, number in hopes:
+            if len(found) >= tries and hope <= found[tries - 1].plan.area:  # what is there can only take from it
+                break
+            survey = self.surveys[number]
+            clear = kept_clear(survey.profile, axes, self.requirements)
+            about = plan_sheets(clear, survey.lines, self.loose, 1)
+            found += [Choice(number, one) for one in about if one.area > least]
+            found.sort(key=lambda choice: -choice.plan.area)
+        best: AxisPlan | None = None
+        for choice in found[:tries]:
+            made = self._beside(choice, axes)
+            if made is None or (axes and made.score(self.requirements) <= 0.0):
+                continue
+            if best is None or made.area > best.area:
+                best = made
+        return best
+
+    def _first_of(self, choice: Choice) -> AxisPlan | None:
+        key = (choice.axis, choice.kinds)
+        if key not in self._first:
+            self._first[key] = self._beside(choice, [])
+        return self._first[key]
+
+    def _beside(self, choice: Choice, done: Sequence[AxisPlan]) -> AxisPlan | None:
+        """Return the sheets about one axis on a fine profile, clear of those that are there."""
+        wanted = self.requirements
+        lines = [(side.radius, side.slope) for side in choice.plan.sides]
+        profile = self.link.profile(choice.plan.profile.frame, _FINE_GRID, wanted.max_bridge)
+        plan = _fullest(kept_clear(profile, done, wanted), lines, wanted, choice.kinds)
+        return plan and _refined(self.link, plan, wanted, done, choice.kinds)
+
+
+def _fullest(
+    profile: RadialProfile,
+    lines: list[SideLine],
+    requirements: SheetRequirements,
+    kinds: tuple[int, int],
+    rise: float = 0.0,
+) -> AxisPlan | None:
+    """Return the plan of certain numbers of full and partial wraps, or of fewer, that is worth most."""
+    plans = plan_sheets(profile, lines, requirements, sum(kinds), rise, kinds)
+    if not plans:  # what was a full wrap on the coarse profile is none on the fine one
+        plans = plan_sheets(profile, lines, requirements, sum(kinds), rise)
+    return max(plans, key=lambda plan: plan.score(requirements), default=None)
+
+
+def _refined(
+    link: SampledLink,
+    plan: AxisPlan,
+    requirements: SheetRequirements,
+    others: Sequence[AxisPlan],
+    kinds: tuple[int, int],
+) -> AxisPlan:
+    """Refit the axis to the region that the sheets cover, and raise the sides from the facets to the corners."""
+    frame, grid, hull = plan.profile.frame, (len(plan.profile.z), len(plan.profile.phi)), link.hull
+    full = [side for side in plan.sides if side.columns == grid[1]]
+    lines = [(side.radius, side.slope) for side in plan.sides]
+    if full:
+        frame = refine_axis(plan.profile, full, requirements.tolerance, requirements.seam_direction)
+    else:
+        side = max(plan.sides, key=lambda side: side.area(plan.profile))
+        cone = InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
+        below = hull.subset(side.covers(plan.profile, hull, requirements.tolerance))
+        fitted = fit_cone(below, cone, (requirements.tolerance,))
+        if fitted is not None:
+            frame = AxisFrame.along(fitted.origin, fitted.axis, requirements.seam_direction)
+            moved = float((fitted.origin - plan.profile.frame.origin) @ fitted.axis)
+            slope = math.tan(fitted.half_angle)
+            lines = [(fitted.radius, slope), *((r + s * moved, s) for r, s in lines)]
+    rises, areas = [], []
+    for side in plan.sides:
+        below = hull.subset(side.covers(plan.profile, hull, requirements.tolerance))
+        near = InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
+        if not full:
+            away = float((frame.origin - plan.profile.frame.origin) @ frame.axis)
+            near = replace(near, radius=side.radius + side.slope * away)
+        rises.append(facet_offset(link.mesh, below, near, requirements.tolerance))
+        areas.append(side.area(plan.profile))
+    profile = kept_clear(link.profile(frame, grid, requirements.max_bridge), others, requirements)
+    again = _fullest(profile, lines, requirements, kinds, float(np.average(rises, weights=areas)))
+    return again if again is not None and again.area > 0.99 * plan.area else plan
+
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
@@ -56,11 +270,6 @@ class LinkFit:
     needed_tolerance: float = math.inf
     bare_areas: tuple[BareArea, ...] = ()
     touch_weights: TouchWeights | None = None
-
-    @property
-    def weights(self) -> str:
-        """Name of the map by which areas were weighed; empty where all count the same."""
-        return "" if self.touch_weights is None else self.touch_weights.name
 
 
 def find_cones(
@@ -115,7 +324,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     surveys += better_surveys(link, surveys, requirements)
     stage = FineStage(link, surveys, requirements)
     tolerance, worth = options.tolerance, link.worth
-    plan, refusal = _plan(stage, options.allow_hull)
+    axes, refusal = _plans(stage, options.allow_hull)
     fit = LinkFit(
         sheets=(),
         nearest=None,
@@ -128,7 +337,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         needed_tolerance=tolerance,
         touch_weights=link.weights,
     )
-    if plan is None:
+    if not axes:
         length, least = fit.link_length, options.min_length
         reason = refusal or f"no cone fits within {tolerance * 1e3:g} mm over a length of {least * 1e3:g} mm"
         if length < least:
@@ -136,53 +345,50 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         say("looking for the nearest sheet")
         looser, needed = _nearest(stage, options.allow_hull)
         nearest = None
-        if looser is not None:
-            first = looser.axes[0]
+        if looser:
+            first = looser[0]
             widest = max(first.sides, key=lambda side: side.area(first.profile))
             nearest = fitted_sheet(first, widest, 0, link.counted, needed, worth)
         return replace(fit, nearest=nearest, needed_tolerance=needed, reason=reason)
-    first = plan.axes[0]
-    further: AxisPlan | None = None
-    if plan.count >= requirements.max_sheets:
-        further = stage.further(plan.axes)
+    first = axes[0]
+    full = sum(len(about.sides) for about in axes) >= requirements.max_sheets
+    further = stage.further(axes) if full else None
     return replace(
         fit,
         sheets=tuple(
             fitted_sheet(about, side, number, link.counted, tolerance, worth)
-            for number, about in enumerate(plan.axes)
+            for number, about in enumerate(axes)
             for side in about.sides
         ),
-        bare_areas=tuple(bare_areas(plan, further, surveys, link.hull, requirements)),
+        bare_areas=tuple(bare_areas(axes, further, surveys, link.hull, requirements)),
         link_length=first.profile.step * len(first.profile.z),
     )
 
 
-def _plan(stage: FineStage, allow_hull: bool) -> tuple[SheetPlan | None, str]:
-    """Return the best plan; or None and, for a mesh that is a bare hull, the reason."""
-    plan, wanted = stage.best_plan(), stage.requirements
-    area, whole = plan.area if plan else 0.0, stage.link.weighed_area
+def _plans(stage: FineStage, allow_hull: bool) -> tuple[tuple[AxisPlan, ...], str]:
+    """Return the best plans; or none and, for a mesh that is a bare hull, the reason."""
+    axes, wanted = stage.best_plans(), stage.requirements
+    area, whole = sum(plan.area for plan in axes), stage.link.weighed_area
     # a requested wrap implies that the shape is known; otherwise sheets should cover some of a convex body
-    if allow_hull or area >= HULL_SHARE * whole or (plan and wanted.wrap):
-        return plan, ""
-    hulled = hull_note(stage.link.mesh, stage.link.hull)
-    if hulled:
-        share = f"{100.0 * area / whole:.0f} %"
-        return None, f"{hulled} (a sheet within {wanted.tolerance * 1e3:g} mm would cover {share} of it)"
-    return plan, ""
+    if not (allow_hull or area >= HULL_SHARE * whole or (axes and wanted.wrap)):
+        hulled = hull_note(stage.link.mesh, stage.link.hull)
+        if hulled:
+            share = f"{100.0 * area / whole:.0f} %"
+            return (), f"{hulled} (a sheet within {wanted.tolerance * 1e3:g} mm would cover {share} of it)"
+    return axes, ""
 
 
-def _nearest(stage: FineStage, allow_hull: bool) -> tuple[SheetPlan | None, float]:
-    """Return a plan within the least of some tolerances that gives one, and that tolerance [m]."""
+def _nearest(stage: FineStage, allow_hull: bool) -> tuple[tuple[AxisPlan, ...], float]:
+    """Return plans within the least of some tolerances that gives one, and that tolerance [m]."""
     wanted = stage.requirements
     for factor in (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0):
         tolerance = math.ceil(factor * wanted.tolerance / _HINT_STEP - 1e-6) * _HINT_STEP
         if tolerance > MOST_TOLERANCE:
             break
-        looser = FineStage(stage.link, stage.surveys, replace(wanted, tolerance=tolerance))
-        plan, _ = _plan(looser, allow_hull)
-        if plan is not None:
-            return plan, tolerance
-    return None, math.inf
+        axes, _ = _plans(FineStage(stage.link, stage.surveys, replace(wanted, tolerance=tolerance)), allow_hull)
+        if axes:
+            return axes, tolerance
+    return (), math.inf
 
 
 def _longest(hull: SurfaceSamples) -> float:

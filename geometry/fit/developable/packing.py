@@ -40,7 +40,7 @@ def _bare_beside(
 ) -> tuple[BareArea, ...]:
     """Return what sheets leave bare, by reason, the largest area first.
 
-    ``more`` could be added if one more were allowed; the reasons of ``earlier``, found before the last sheets, hold.
+    ``more`` could be added; the reasons of ``earlier``, found before the last sheets, hold.
     """
     tally = BareTally(hull, _covered(sheets, hull, options.tolerance))
     take = tally.take

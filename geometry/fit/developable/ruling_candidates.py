@@ -17,6 +17,7 @@ from coneskin.geometry.displacement_map import bridge_holes
 from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, most_voted
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.profile import AxisFrame, RadialProfile, Region
+from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
 
 _DRAW_COUNT = 1600  # pairs, and triples, of samples
@@ -90,16 +91,10 @@ def _ruled_region(
     least_columns: int,
     full_only: bool = False,
 ) -> Region | None:
-    """Return the region of largest area in which every column is straight within a tolerance.
+    """Return the region of largest area in which every column is straight within a tolerance across its ruling [m].
 
-    Args:
-        profile: the hull about a line.
-        scale: size of the section in each row, over that at the origin, shape (k,).
-        tolerance: largest distance from the ruling, across it [m].
-        rows: least number of rows.
-        least: smallest radius a sheet may have in each row [m], shape (k,).
-        least_columns: least number of columns.
-        full_only: True for full wraps only.
+    The scale is the size of the section in each row over that at the origin, ``least`` the smallest radius there [m],
+    each of shape (k,).
     """
     usable = scale > 0.05
     scale = np.where(usable, scale, 1.0)[:, None]
@@ -135,7 +130,8 @@ def _ruled_region(
                 continue
             if full_only:
                 break
-            column, run = _longest_run(alive)
+            column, after = longest_run(np.concatenate([alive, alive]))  # the columns go round
+            run = after - column
             if run >= least_columns and run * (end - first) > worth:
                 best, worth = Region(first, end, column, run), float(run * (end - first))
     return best
@@ -153,16 +149,6 @@ def _obliquity(radius: Floats, good: Bools) -> Floats:
     section = np.where(np.isfinite(section), section, np.nanmedian(section))
     slope = (np.roll(section, -1) - np.roll(section, 1)) / (4.0 * np.pi / around * section)
     return np.asarray(np.minimum(np.hypot(1.0, slope), 2.0))
-
-
-def _longest_run(alive: Bools) -> tuple[int, int]:
-    """Return the first column and the length of the longest run of a ring."""
-    gaps = np.flatnonzero(~alive)
-    if len(gaps) == 0:
-        return 0, len(alive)
-    lengths = np.diff(np.concatenate([gaps, [gaps[0] + len(alive)]])) - 1
-    longest = int(lengths.argmax())
-    return int((gaps[longest] + 1) % len(alive)), int(lengths[longest])
 
 
 def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -> list[RulingCandidate]:

@@ -261,9 +261,9 @@ def _print(found: LinkDesign) -> None:
         if small := small_active_area(design):
             print(f"  warning: {small}")
     fit = found.fit
-    if fit is not None and fit.weights:
+    if fit is not None and fit.touch_weights:
         share = sum(sheet.touch_share for sheet in fit.sheets)
-        print(f"weighed by {fit.weights}, the sheets cover {share:.0%} of the hull")
+        print(f"weighed by {fit.touch_weights.name}, the sheets cover {share:.0%} of the hull")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")
 

@@ -206,13 +206,7 @@ _EXAMPLE = "write TABLE.KEY=VALUE, as in --set drawings.kerf_mm=0.2"
 
 @dataclass(frozen=True, slots=True)
 class _DesignSettings:
-    """Options of a design, as ``design_link`` takes them.
-
-    Attributes:
-        options: materials, widths and electronics.
-        files: of the drawings.
-        search: keyword arguments of the search: fields of ``FitOptions``, and ``round_only``.
-    """
+    """Options of a design, of its files, and the keyword arguments of the search, as ``design_link`` takes them."""
 
     options: DesignOptions
     files: FileOptions

@@ -91,12 +91,7 @@ def check_target(target: Path, replace: bool = False) -> None:
 
 @contextmanager
 def _new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
-    """Open a temporary folder that becomes the target if the block succeeds, and is removed if it fails.
-
-    Raises:
-        GeometryError: the target exists already, or cannot be made; or a file of a person's there has the name of a new
-            one.
-    """
+    """Open a temporary folder that becomes the target if the block succeeds, and is removed if it fails."""
     target = Path(os.path.realpath(target))
     check_target(target, replace)
     try:

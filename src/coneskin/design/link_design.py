@@ -115,8 +115,7 @@ def _fit_link(
 ) -> tuple[LinkMesh, LinkFit]:
     """Return the first mesh of a link in which sheets are found, with its fit; else the first mesh.
 
-    Arguments as those of ``design_link``. Without ``seam_direction`` the seams are where the link shields them most
-    (``place_seams``).
+    Without ``seam_direction`` the seams are where the link shields them most (``place_seams``).
     """
     facing = search.get("seam_direction")
     search = {name: value for name, value in search.items() if name != "seam_direction" or facing}
@@ -248,11 +247,7 @@ class LinkDesign:
 
 
 def _check_size(place: PlacedFrustum) -> None:
-    """Refuse a side that is larger than any link, as where millimeters were meant.
-
-    Raises:
-        GeometryError: it is, or it is no side.
-    """
+    """Refuse a side that is larger than any link, as where millimeters were meant."""
     if not isinstance(place, PlacedFrustum):
         raise GeometryError(f"a place must be a PlacedFrustum, got {place!r}: give the pose of each Frustum")
     for name in ("radius1", "radius2", "height"):

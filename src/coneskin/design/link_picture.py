@@ -38,12 +38,7 @@ _OUTLINE_LIFT = 2e-3  # m by which lines stand off a surface, which lies up to t
 
 
 class _View:
-    """A body from far away, as it is drawn on a plane: x to the right, y up [mm].
-
-    Args:
-        body: what is seen, and what hides.
-        way: direction to the viewer.
-    """
+    """A body from far away, which hides what is behind it, drawn on a plane: x to the right, y up [mm]."""
 
     def __init__(self, body: Mesh, way: Any) -> None:
         self.way = np.asarray(way) / np.linalg.norm(way)

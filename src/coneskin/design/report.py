@@ -75,11 +75,10 @@ def _coverage(fit: LinkFit) -> Iterator[str]:
         f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
         f"{sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull of the link"
     )
-    if fit.weights:
-        yield (
-            f"* Weighed by {fit.weights}, that is {sum(sheet.touch_share for sheet in fit.sheets):.0%} of it: the "
-            "sheets are those that cover most of what counts"
-        )
+    if fit.touch_weights:
+        share = sum(sheet.touch_share for sheet in fit.sheets)
+        most = "the sheets are those that cover most of what counts"
+        yield f"* Weighed by {fit.touch_weights.name}, that is {share:.0%} of it: {most}"
     for area in fit.bare_areas:
         yield f"* No sheet on {area.share:.0%} of the hull: {area.reason}"
 

@@ -11,8 +11,7 @@ import trimesh
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
-from coneskin.design.workshop.jig import Collar, _CollarPart, _lip_play, jig_collars
-from coneskin.design.workshop.link_excess import LinkExcess
+from coneskin.design.workshop.jig import Collar, _CollarPart, _LinkExcess, _lip_play, jig_collars
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
@@ -198,7 +197,7 @@ def test_facets_of_a_mesh_do_not_show_where_a_collar_belongs() -> None:
     faces = [f for k in range(12) for f in ((k, (k + 1) % 12, 12 + k), ((k + 1) % 12, 12 + (k + 1) % 12, 12 + k))]
     body = make_mesh(np.concatenate(ends), np.array(faces))
     side, turned = Frustum(0.05, 0.05, 0.2), np.linspace(0.2, 3.0, 161)
-    link = LinkExcess(side, 0.2, 1.0, 0.04, body, Pose())
+    link = _LinkExcess(side, 0.2, 1.0, 0.04, body, Pose())
     lips = [(turned, np.full(161, 0.015), np.zeros(161, bool))]
     facets = 0.05 * (1.0 - math.cos(math.pi / 12.0))
     assert _lip_play(link, lips, 0.015, 0.3e-3) is not None

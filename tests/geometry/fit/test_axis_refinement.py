@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.plan import refine_axis
+from coneskin.geometry.fit.cones import refine_axis
 from coneskin.geometry.fit.profile import AxisFrame, measure_profile
 from coneskin.geometry.fit.side import fit_side
 from coneskin.geometry.mesh import make_mesh

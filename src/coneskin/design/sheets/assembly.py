@@ -51,11 +51,7 @@ def sheet_gap(one: SheetBody, two: SheetBody, rows: int = _SHELL_COUNT[0]) -> tu
 
 
 def _cut_back(place: PlacedFrustum, start: float, end: float) -> PlacedFrustum:
-    """Return a place, shortened by lengths along the slant at end 1 and end 2 [m].
-
-    Raises:
-        GeometryError: nothing would be left.
-    """
+    """Return a place, shortened along the slant at end 1 and end 2 [m]; refused where nothing would be left."""
     side = place.frustum
     if start + end >= side.slant:
         raise GeometryError(

@@ -136,38 +136,30 @@ class TabApron:
         """Return the strip of a sheet whose tabs leave at a height [m] above the link."""
         side, plan, sheet = layout.plan.wires, layout.plan, layout.sheet
         roots = [tab_foot(layout, name) for name in "ABCD"]
-        length = np.array([0.02, 0.3, 0.5, 0.75, 1.0]) * max(plan.tab, 4e-3)
-        sign = -1.0 if side in ("end1", "edge0") else 1.0
-        half = 0.5 * plan.lead
-        if side.startswith("end"):
-            u = roots[0][0]
-            radius = max(sheet.radius_at(u), 1e-3)
-            middle = math.atan2(*(math.fsum(f(phi) for _, phi in roots) for f in (math.sin, math.cos)))
-            off = [math.remainder(phi - middle, math.tau) for _, phi in roots]
-            low, high = min(off) - half / radius, max(off) + half / radius
-            turns = middle + np.linspace(low, high, max(2, math.ceil((high - low) * radius / 2e-3)))
-            grid = np.meshgrid(u + sign * length, turns, indexing="ij")
-            far = np.repeat(length, len(turns))
-            rim = np.arange(len(turns))
-            tips = rim + len(far) - len(turns)
-            at = u, middle
+        out = np.array([0.02, 0.3, 0.5, 0.75, 1.0]) * max(plan.tab, 4e-3)
+        ahead = -out if side in ("end1", "edge0") else out
+        at_end = side.startswith("end")
+        if at_end:
+            u, phi = roots[0][0], math.atan2(*(math.fsum(f(phi) for _, phi in roots) for f in (math.sin, math.cos)))
         else:
-            phi = roots[0][1]
-            middle = math.fsum(u for u, _ in roots) / 4.0
-            low, high = min(u for u, _ in roots) - half - middle, max(u for u, _ in roots) + half - middle
-            rows = middle + np.linspace(low, high, max(2, math.ceil((high - low) / 2e-3)))
-            radius = max(sheet.radius_at(middle), 1e-3)
-            grid = np.meshgrid(rows, phi + sign * length / radius, indexing="ij")
-            far = np.tile(length, len(rows))
-            rim = np.arange(len(rows)) * len(length)
-            tips = rim + len(length) - 1
-            at = middle, phi
+            u, phi = math.fsum(u for u, _ in roots) / 4.0, roots[0][1]
+        radius = max(sheet.radius_at(u), 1e-3)
+        off = (
+            [math.remainder(at - phi, math.tau) * radius for _, at in roots] if at_end else [at - u for at, _ in roots]
+        )
+        low, high = min(off) - 0.5 * plan.lead, max(off) + 0.5 * plan.lead
+        beside = np.linspace(low, high, max(2, math.ceil((high - low) / 2e-3)))
+        if at_end:
+            us, phis = np.meshgrid(u + ahead, phi + beside / radius, indexing="ij")
+        else:
+            phis, us = np.meshgrid(phi + ahead / radius, u + beside, indexing="ij")
+        rim, far = np.arange(len(beside)), np.repeat(out, len(beside))
+        tips = np.stack([rim, rim + len(far) - len(beside)], axis=1)
         if math.isinf(slope):
-            points, normals = place.place(grid[0].ravel(), np.full(grid[0].size, at[1]))
-            return cls(*at, points + (height + far)[:, None] * normals, np.stack([rim, tips], 1), normals, slope)
-        points, normals = place.place(grid[0].ravel(), grid[1].ravel())
-        feet = points + (height + slope * far)[:, None] * normals
-        return cls(*at, feet, np.stack([rim, tips], 1), normals, slope)
+            points, normals = place.place(us.ravel(), np.full(us.size, phi))
+            return cls(u, phi, points + (height + far)[:, None] * normals, tips, normals, slope)
+        points, normals = place.place(us.ravel(), phis.ravel())
+        return cls(u, phi, points + (height + slope * far)[:, None] * normals, tips, normals, slope)
 
     def body(self) -> _StrandBody:
         """Return the space that the tabs take."""

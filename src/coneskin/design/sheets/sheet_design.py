@@ -210,7 +210,7 @@ class SheetDesign:
     def drive_currents(self) -> tuple[float, float]:
         """Drive currents of the untouched sensor in the radial and in the angular phase [A]."""
         parts = self.electronics
-        radial, angular = _resistances(self.active.frustum, self.conductive)
+        radial, angular = sheet_resistances(self.active.frustum, *(sheet.ohms for sheet in self.conductive))
         leads = parts.lead_ohms
         return parts.supply_volts / (radial + leads.a + leads.b), parts.supply_volts / (angular + leads.c + leads.d)
 
@@ -334,6 +334,7 @@ def _sheet_design(
     active = _active(placed.place, placed.layout, options.stack)
     squares = sheet_resistances(active.frustum, 1.0, 1.0)[0]
     conductive = match_sheet_materials(squares, options.upper_sheet_ohms, options.lower_sheet_ohms)
+    resistances = sheet_resistances(active.frustum, *(sheet.ohms for sheet in conductive))
     drawn = cut_sheets(
         placed.layout,
         _with_materials(options.stack, conductive),
@@ -353,7 +354,7 @@ def _sheet_design(
         active=active,
         options=options,
         conductive=conductive,
-        electronics=match_electronics(*_resistances(active.frustum, conductive), options.electronics),
+        electronics=match_electronics(*resistances, options.electronics),
         apron=placed.apron,
         way=placed.way,
         gaps={other: gap for other, gap in apart.items() if gap < _NEAR_SHEET},
@@ -395,11 +396,6 @@ def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
         return link
     mean = 0.5 * (side.radius1 + side.radius2)
     return PlacedFrustum(Frustum(mean, mean, side.height, side.wrap), link.link_frustum)
-
-
-def _resistances(active: Frustum, conductive: tuple[SheetMaterial, SheetMaterial]) -> tuple[float, float]:
-    """Return the resistances of the two sheets [ohm]."""
-    return sheet_resistances(active, conductive[0].ohms, conductive[1].ohms)
 
 
 def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:

@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from coneskin.geometry.developable import Developable
 from coneskin.geometry.drawing.cut_sheet import CutSheet
 from coneskin.geometry.drawing.electrode_layout import (
     LEAST_ACTIVE_SHARE,
@@ -154,7 +155,7 @@ lower_sheet_ohm = {design.conductive[1].ohms!r}
 def _bends(design: SheetDesign) -> dict[str, Any]:
     """Return how a side is bent that is not round, and what its layers then miss of a sector."""
     place = design.place
-    if not place.bends:
+    if not isinstance(place, Developable):
         return {}
     stack = design.options.stack
     height = max(stack.offset(index) for index in range(5))
@@ -228,10 +229,7 @@ def _sizes(cut: CutSheet) -> dict[str, float]:
 
 
 def _round(value: float, digits: int = 4) -> float:
-    """Return a value rounded for readers; the drawings and the cone in the sensor file keep every digit.
-
-    The pose is rounded: a sheet cannot be placed to a tenth of a micrometre or of a thousandth of a degree.
-    """
+    """Return a value rounded for readers; drawings and cones keep all digits, and no sheet is placed so exactly."""
     return round(value, digits) + 0.0
 
 

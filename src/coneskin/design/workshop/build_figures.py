@@ -99,11 +99,7 @@ def _pair_readings(design: SheetDesign) -> tuple[_PairReading, _PairReading]:
 
 
 def _expected_frame(design: SheetDesign, index: int, frame: str = "mesh") -> dict[str, int]:
-    """Return the counts of the untouched sensor, by field of a frame, as ``coneskin monitor`` expects them.
-
-    Raises:
-        GeometryError: a scene would refuse the sensor.
-    """
+    """Return the counts of the untouched sensor, by field of a frame, as ``coneskin monitor`` expects them."""
     problems: list[str] = []
     built = build_sensor(tomllib.loads(sensor_toml(design, index, frame)), "sensor.toml", problems)
     if built is None or problems:
@@ -119,13 +115,7 @@ def _part(design: SheetDesign, index: int, box: SurfaceRectangle) -> Frustum:
 
 
 def _span(shape: SurfaceShape, at: float, along: bool) -> tuple[float, float]:
-    """Return where a line across a shape enters and leaves it.
-
-    Args:
-        shape: closed, of corners.
-        at: phi of a line along the sheet [rad], or u of a line around it [m].
-        along: True for a line along the sheet.
-    """
+    """Return where a line at phi [rad] along, or at u [m] around, enters and leaves a closed shape of corners."""
     corners = [corner for corner in shape if isinstance(corner, ShapeCorner)]
     found = []
     for one, two in zip(corners, corners[1:] + corners[:1], strict=True):

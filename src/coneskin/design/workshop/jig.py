@@ -5,6 +5,11 @@ cone where there is no mesh. Then a step as high as the sheet, against which the
 sleeve over the sheet. Towards the joint of the link the lip ends flush with the outermost face of the link if that is
 near, otherwise at its own length; where a part of the link stands out, its edge keeps clear of that part, which fixes
 its azimuth as well. A collar is split into parts that are put on from the side, so none of them has an undercut.
+
+The height of the link above the cone is found by rays at the nodes of a grid. Between them an edge of the mesh may
+stand out further: over a facet the distance from an axis has no maximum but on its border, so the edges are followed as
+well, and what stands out in a cell counts for its four nodes. A surface through the nodes is then nowhere below the
+link, but for the sag of its own chords.
 """
 
 from __future__ import annotations
@@ -12,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -20,11 +25,11 @@ from coneskin.core.arrays import Bools, Floats
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.surface_shape import ShapeTab
+from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
+from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.solid import shell_surface, widest_nearby, without_undercut
-
-from .link_excess import LinkExcess
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -61,12 +66,124 @@ def _blocked(design: SheetDesign, neighbors: Sequence[SheetDesign], end: int) ->
     return ""
 
 
+_EDGE_STEP = 0.4e-3  # m; between the points at which an edge is looked at
+_GRID_MARGIN = 1e-3  # m; before the end of the sheet, and beyond the reach, that is looked at too
+
+
+class _EdgePoints(NamedTuple):
+    excess: Floats  # above the cone [m]
+    outwards: Floats  # along the axis from the sheet's end [m]
+    phi: Floats  # azimuth [rad]
+
+
+class _LinkExcess:
+    """What is outermost beside one end of a sheet, in the frame of the sheet.
+
+    Args:
+        side: cone of the link under the sheet; it is extended beyond the end.
+        step: height of the end of the sheet on the axis [m].
+        sign: of the direction away from the sheet along the axis.
+        reach: how far from the end is looked [m].
+        body: the link, in a frame of its own; None where it is the cone itself.
+        pose: of the frame of the link, seen from that of the sheet.
+    """
+
+    def __init__(self, side: Frustum, step: float, sign: float, reach: float, body: Mesh | None, pose: Pose) -> None:
+        self._side, self._step, self._sign = side, step, sign
+        beside = None if body is None else _beside(body, pose, step, sign, reach)
+        self._far = 0.0 if beside is None else float(np.sqrt((beside.vertices[:, :2] ** 2).sum(axis=1).max())) + 0.01
+        self._rays = None if beside is None else RayCaster(beside)
+        self._edges = None if beside is None else self._follow_edges(beside, reach)
+
+    def cone(self, z: float | Floats) -> Floats:
+        """Return the radius of the extended cone at heights on the axis [m]."""
+        slope = (self._side.radius2 - self._side.radius1) / self._side.height
+        return np.asarray(np.maximum(_LEAST_RADIUS, self._side.radius1 + slope * np.asarray(z, float)))
+
+    def height(self, outwards: float | Floats) -> Floats:
+        """Return the height on the axis at a distance from the sheet's end [m]."""
+        return np.asarray(self._step + self._sign * np.asarray(outwards, float))
+
+    def over(self, share: Floats, lengths: Floats, phi: Floats, margin: float) -> Floats:
+        """Return the height of the link above the cone at the nodes of a grid [m], 0 where there is no link.
+
+        Args:
+            share: of the length of a column at which its nodes lie, from 0 at the sheet's end, evenly up to 1.
+            lengths: of the columns, away from the sheet [m], shape (n,).
+            phi: azimuths of the columns, evenly [rad], shape (n,).
+            margin: an edge outside the grid that is nearer to it than this counts too [m].
+        """
+        result = np.zeros((len(share), len(phi)))
+        if self._rays is None or self._edges is None:
+            return result
+        z = self.height(share[:, None] * lengths)
+        cone, radial = self.cone(z), np.stack([np.cos(phi), np.sin(phi), np.zeros_like(phi)], axis=-1)
+        origins = np.broadcast_to(self._far * radial, (*z.shape, 3)).copy()
+        origins[..., 2] = z
+        ways = np.broadcast_to(-radial, origins.shape)
+        depth, _ = self._rays.cast(origins.reshape(-1, 3), np.ascontiguousarray(ways).reshape(-1, 3))
+        radius = (self._far - depth).reshape(z.shape)
+        # beyond the link, or through an open end of the mesh, there is nothing to lie on
+        found = np.isfinite(radius) & (radius > 0.5 * cone)
+        result[found] = (radius - cone)[found]
+        self._add_edges(result, lengths, phi, margin)
+        return result
+
+    def _add_edges(self, result: Floats, lengths: Floats, phi: Floats, margin: float) -> None:
+        """Raise the nodes around each point of an edge to its height."""
+        assert self._edges is not None
+        excess, outwards, azimuth = self._edges
+        rows, columns = result.shape
+        width = float(phi[1] - phi[0])
+        beside = margin / float(self.cone(self._step))
+        x = ((azimuth - phi[0] + beside) % math.tau - beside) / width
+        near = (x <= columns - 1 + beside / width) & (outwards >= -margin)
+        x = np.clip(x[near], 0.0, columns - 1)
+        excess, outwards = excess[near], outwards[near]
+        length = np.interp(x, np.arange(columns), lengths)
+        reached = outwards <= length + margin
+        x, excess = x[reached], excess[reached]
+        y = np.clip(outwards[reached] / np.maximum(length[reached], 1e-9), 0.0, 1.0) * (rows - 1)
+        for row in (np.floor(y), np.ceil(y)):
+            for column in (np.floor(x), np.ceil(x)):
+                np.maximum.at(result, (row.astype(int), column.astype(int)), excess)
+
+    def _follow_edges(self, body: Mesh, reach: float) -> _EdgePoints:
+        """Return points along the edges of the link that are beside the sheet's end."""
+        pairs = np.sort(body.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        lower, upper = np.divmod(np.unique(pairs[:, 0] * len(body.vertices) + pairs[:, 1]), len(body.vertices))
+        first, last = body.vertices[lower], body.vertices[upper]
+        a, b = (self._sign * (ends[:, 2] - self._step) for ends in (first, last))
+        low, high = -_GRID_MARGIN, reach + _GRID_MARGIN
+        beside = (np.maximum(a, b) >= low) & (np.minimum(a, b) <= high)
+        first, last, a, b = first[beside], last[beside], a[beside], b[beside]
+        with np.errstate(divide="ignore", invalid="ignore"):  # the part of each edge that is beside the sheet's end
+            to_low, to_high = (low - a) / (b - a), (high - a) / (b - a)
+        level = a == b
+        start = np.where(level, 0.0, np.clip(np.minimum(to_low, to_high), 0.0, 1.0))
+        stop = np.where(level, 1.0, np.clip(np.maximum(to_low, to_high), 0.0, 1.0))
+        first, last = first + start[:, None] * (last - first), first + stop[:, None] * (last - first)
+        counts = np.ceil(np.linalg.norm(last - first, axis=1) / _EDGE_STEP).astype(np.int64) + 1
+        edge = np.repeat(np.arange(len(counts)), counts)
+        at = (np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)) / np.maximum(counts[edge] - 1, 1)
+        x, y, z = (first[edge] + at[:, None] * (last - first)[edge]).T
+        return _EdgePoints(np.hypot(x, y) - self.cone(z), self._sign * (z - self._step), np.arctan2(y, x))
+
+
+def _beside(body: Mesh, pose: Pose, step: float, sign: float, reach: float) -> Mesh | None:
+    """Return the faces that rays or edges beside a sheet's end can meet, in its frame; None where there is none."""
+    away = sign * (body.vertices @ np.array(pose.rotation[2]) + (pose.translation[2] - step))
+    beyond, before = ((away > reach + _GRID_MARGIN)[body.faces], (away < -_GRID_MARGIN)[body.faces])
+    near = ~(beyond.all(axis=1) | before.all(axis=1))
+    return body.part(near).moved(pose) if near.any() else None
+
+
 _LIP_ROWS = 61  # along the lip
 _MAX_PLAY = 12  # columns of a degree; a collar that can be turned further does not show its azimuth
 
 
 def _lip_play(
-    link: LinkExcess,
+    link: _LinkExcess,
     lips: Sequence[tuple[Floats, Floats, Bools]],
     wanted: float,
     clearance: float,
@@ -75,14 +192,8 @@ def _lip_play(
     """Return the angle between the two positions in which a collar meets its link [rad]; None where there are none.
 
     The collar stays about the axis of its sheet, but for a shift by the clearance. Facets are the mesh's, not the
-    link's: a collar that is held by nothing else does not show its azimuth.
-
-    Args:
-        link: beside the end of the sheet.
-        lips: of the parts: azimuths of the columns, evenly [rad]; lengths of the lip there [m]; where tabs leave.
-        wanted: length of a lip where nothing is in its way [m].
-        clearance: gap between lip and link [m].
-        facets: height of the corners of the mesh above its facets [m].
+    link's: a collar that is held by nothing else does not show its azimuth. Of each lip there are the azimuths of its
+    columns, evenly, its lengths there, and where tabs leave.
     """
     share = np.linspace(0.0, 1.0, _LIP_ROWS)
     ways = [_MAX_PLAY + 1, _MAX_PLAY + 1]
@@ -114,19 +225,15 @@ _CHANNEL_HEIGHT = 8e-3  # m; height of the way out for tabs with their wires
 _TAB_ROOM = 3e-3  # m; on both sides of the tabs
 _SEAT_RIM_WIDTH, _SEAT_RIM_HEIGHT = 2e-3, 1.5e-3  # m; width of the rims that keep a strap on its seat, and their height
 _NOTCH_DEPTH = 1e-3  # m; depth of the grooves that number a part
-_LEAST_RADIUS = 4e-3  # m
+_LEAST_RADIUS = 4e-3  # m; a cone is not followed nearer to its apex
 _MIN_CONE_COSINE = 0.5  # cosine of the half angle; a collar around a flatter cone has nothing to grip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CollarPart:
-    """One printed part of a collar.
+    """One printed part of a collar, standing on its wide face; z is the axis of the sheet.
 
-    Attributes:
-        number: of the part, from 1, anticlockwise from edge 0 as seen from end 2; as many grooves are on its outside.
-        start: azimuth of its first side, from edge 0 [rad].
-        end: azimuth of its other side [rad].
-        surface: standing on its wide face as it is printed; the axis of the sheet is z.
+    Parts are numbered from 1, anticlockwise from edge 0 as seen from end 2, and have as many grooves on the outside.
     """
 
     number: int
@@ -228,7 +335,7 @@ class _Builder:
             self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
         self.flush = self.room is not None and _MIN_LIP <= self.room <= _FLUSH_DISTANCE
         self.wanted = self.room if self.flush and self.room is not None else self.plan.grip
-        self.link = LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, body, pose)
+        self.link = _LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, body, pose)
 
     def collar(self) -> Collar:
         """Return the collar.

@@ -55,13 +55,9 @@ class DatumFace:
 
 @dataclass(frozen=True, slots=True)
 class _DatumHeight:
-    """Distances of one place of a bare link from the planes of its faces.
+    """Distances of a place (u, phi) of a bare link from the planes of its faces [m].
 
-    Attributes:
-        u: of the place, from end 1 along the surface [m].
-        phi: of the place, from edge 0 [rad].
-        heights: from each face [m].
-        steep: for each face, True where turning the sheet changes the height by 0.7 of the way at least.
+    ``steep`` tells of each whether turning the sheet changes it by 0.7 of the way at least.
     """
 
     u: float
