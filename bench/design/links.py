@@ -110,19 +110,7 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     rays = RayCaster(mesh)
     hull = sample_surface(mesh, rays, 12_000, seed=7)
     whole = len(hull) * hull.area
-    wanted = SheetRequirements(
-        FIT_TOLERANCE,
-        sheets,
-        None,
-        0.025,
-        math.radians(150.0),
-        0.010,
-        np.array([1.0, 0.0, 0.0]),
-        0.004,
-        0.0062,
-        0.001,
-        LEAST_GAIN * whole,
-    )
+    wanted = SheetRequirements(FIT_TOLERANCE, sheets, least_gain=LEAST_GAIN * whole)
     axes = brute_axes(hull)
     link = SampledLink(mesh, rays, hull, hull, None, axes)
     surveys = survey_axes(link, wanted)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from coneskin.core.arrays import Bools, Floats
 
+from .fit_options import FitOptions
 from .profile import RadialProfile, Region
 from .side import StraightSide, balance_borders, choose_intervals, fit_side, longest_intervals
-from .touch_weights import TouchWeights
 
 
 def _largest_region(
@@ -113,25 +113,17 @@ _MIN_CELL_SHARE = 0.97  # of the largest side so far: fewer cells near a line ho
 
 
 @dataclass(frozen=True, slots=True)
-class SheetRequirements:
-    """Requirements on the sheets: the arguments of ``find_cones``, and what a further sheet must add [m2].
+class SheetRequirements(FitOptions):
+    """Options of a search that are checked already, or made of such; its weights are those of the link.
 
-    With weights, that area and every other one is weighed by them.
+    Attributes:
+        least_gain: what a further sheet must add, by the weights [m2].
     """
 
-    tolerance: float
-    max_sheets: int
-    wrap: float | None
-    min_length: float
-    min_wrap: float
-    max_bridge: float
-    seam_direction: Floats
-    min_radius: float
-    thickness: float
-    gap: float
-    least_gain: float
-    weights: TouchWeights | None = None
-    min_arc: float = 0.0
+    least_gain: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check nothing: a search looks beyond the limits too."""
 
     def least_radius(self, wrap: float) -> float:
         """Return the smallest radius [m] of a side at least so wide [rad]; its fit may lie a tolerance inside."""

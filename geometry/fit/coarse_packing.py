@@ -127,7 +127,7 @@ def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[Axis
     """Measure a coarse profile about every axis; ``FineStage`` packs sheets on them for any tolerance."""
     surveys = []
     for candidate in link.axes:
-        frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam_direction)
+        frame = AxisFrame.along(candidate.origin, candidate.axis, requirements.seam)
         profile = link.profile(frame, _COARSE_GRID, requirements.max_bridge)
         surveys.append(AxisSurvey(profile, _side_lines(profile, candidate.cones)))
     return surveys

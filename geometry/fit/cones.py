@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from .fit_options import MOST_TOLERANCE, FitOptions, check_names
 from .fitted_sheet import FittedSheet, fitted_sheet
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, facet_offset
-from .surface_samples import SurfaceSamples
 from .touch_weights import TouchWeights
 
 
@@ -210,14 +209,14 @@ def _refined(
     full = [side for side in plan.sides if side.columns == grid[1]]
     lines = [(side.radius, side.slope) for side in plan.sides]
     if full:
-        frame = refine_axis(plan.profile, full, requirements.tolerance, requirements.seam_direction)
+        frame = refine_axis(plan.profile, full, requirements.tolerance, requirements.seam)
     else:
         side = max(plan.sides, key=lambda side: side.area(plan.profile))
         cone = InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope))
         below = hull.subset(side.covers(plan.profile, hull, requirements.tolerance))
         fitted = fit_cone(below, cone, (requirements.tolerance,))
         if fitted is not None:
-            frame = AxisFrame.along(fitted.origin, fitted.axis, requirements.seam_direction)
+            frame = AxisFrame.along(fitted.origin, fitted.axis, requirements.seam)
             moved = float((fitted.origin - plan.profile.frame.origin) @ fitted.axis)
             slope = math.tan(fitted.half_angle)
             lines = [(fitted.radius, slope), *((r + s * moved, s) for r, s in lines)]
@@ -304,32 +303,21 @@ def find_cones(
 
 def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]) -> LinkFit:
     """Find the frusta that cover most of a sampled link; ``say`` is called with the name of each step."""
-    requirements = SheetRequirements(
-        options.tolerance,
-        options.most_sheets,
-        options.wrap,
-        options.min_length,
-        options.min_wrap,
-        options.max_bridge,
-        options.seam,
-        options.min_radius,
-        options.thickness,
-        options.gap,
-        LEAST_GAIN * link.weighed_area,
-        link.weights,
-        options.min_arc,
-    )
+    asked = {item.name: getattr(options, item.name) for item in fields(FitOptions)}
+    asked |= {"max_sheets": options.most_sheets, "weights": link.weights}
+    requirements = SheetRequirements(**asked, least_gain=LEAST_GAIN * link.weighed_area)
     say("measuring profiles")
     surveys = survey_axes(link, requirements)
     surveys += better_surveys(link, surveys, requirements)
     stage = FineStage(link, surveys, requirements)
     tolerance, worth = options.tolerance, link.worth
     axes, refusal = _plans(stage, options.allow_hull)
+    off = link.hull.points - link.hull.points.mean(axis=0)  # along its longest direction
     fit = LinkFit(
         sheets=(),
         nearest=None,
         tolerance=tolerance,
-        link_length=_longest(link.hull),
+        link_length=float(np.ptp(off @ np.linalg.eigh(off.T @ off)[1][:, 2])),
         hull_area=link.hull_area,
         notes=link.mesh.notes,
         reason="",
@@ -389,9 +377,3 @@ def _nearest(stage: FineStage, allow_hull: bool) -> tuple[tuple[AxisPlan, ...], 
         if axes:
             return axes, tolerance
     return (), math.inf
-
-
-def _longest(hull: SurfaceSamples) -> float:
-    """Return the length of the hull along its longest direction [m]."""
-    off = hull.points - hull.points.mean(axis=0)
-    return float(np.ptp(off @ np.linalg.eigh(off.T @ off)[1][:, 2]))

@@ -25,7 +25,7 @@ Interval = tuple[int, int]  #: first slice and the one after the last
 _ROUNDING_ERROR = 1e-9  # m; so that no interval is given up that is good by rounding
 
 
-def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float, int]:
+def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float, float]:
     """Return the straight side with the least largest distance from all slices (Chebyshev fit).
 
     Args:
@@ -34,45 +34,40 @@ def _least_deviation(z: Floats, high: Floats, low: Floats) -> tuple[float, float
         low: smallest radii [m], shape (k,).
 
     Returns:
-        largest distance between side and slices, square to the side [m]; radius at z = 0 [m]; slope dr/dz; and the
-        first of the slices that by themselves deviate as much.
+        largest distance between side and slices, square to the side [m]; radius at z = 0 [m]; slope dr/dz.
     """
 
-    def value(slope: float) -> tuple[float, float, float, float, int]:
+    def value(slope: float) -> tuple[float, float, float, float]:
         line = slope * z
         above, below = high - line, low - line
         i, j = int(above.argmax()), int(below.argmin())
         top, bottom = float(above[i]), float(below[j])
-        return top - bottom, float(z[j] - z[i]), top, bottom, min(i, j)
+        return top - bottom, float(z[j] - z[i]), top, bottom
 
     reach = float(z[-1] - z[0])
     if reach <= 0.0:
-        gap, _, top, bottom, first = value(0.0)
-        return 0.5 * gap, 0.5 * (top + bottom), 0.0, first
+        gap, _, top, bottom = value(0.0)
+        return 0.5 * gap, 0.5 * (top + bottom), 0.0
     bound = (float(high.max() - low.min()) + 1e-9) / (float(z[1] - z[0]))
     left, right = -bound, bound
-    f_left, g_left, _, _, i_left = value(left)
-    f_right, g_right, _, _, i_right = value(right)
-    slope, first = 0.0, 0
-    f, g, top, bottom, i = value(slope)
+    f_left, g_left, _, _ = value(left)
+    f_right, g_right, _, _ = value(right)
+    slope = 0.0
+    f, g, top, bottom = value(slope)
     for _ in range(60):
         if g < 0.0:
-            left, f_left, g_left, i_left = slope, f, g, i
+            left, f_left, g_left = slope, f, g
         elif g > 0.0:
-            right, f_right, g_right, i_right = slope, f, g, i
-        else:
-            first = i
-            break
-        if not g_right > g_left:
+            right, f_right, g_right = slope, f, g
+        if g == 0.0 or not g_right > g_left:
             break
         # the convex function cannot be lower than the point where the supporting lines of both sides meet
         slope = (f_left - f_right + g_right * right - g_left * left) / (g_right - g_left)
         bottom_line = f_left + g_left * (slope - left)
-        f, g, top, bottom, i = value(slope)
+        f, g, top, bottom = value(slope)
         if f <= bottom_line + 1e-12:
-            first = min(i_left, i_right)
             break
-    return 0.5 * f / math.hypot(1.0, slope), 0.5 * (top + bottom), slope, first
+    return 0.5 * f / math.hypot(1.0, slope), 0.5 * (top + bottom), slope
 
 
 def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, min_slices: int = 2) -> list[int]:
@@ -85,34 +80,22 @@ def longest_intervals(z: Floats, high: Floats, low: Floats, tolerance: float, mi
     holes = np.concatenate([np.cumsum(~usable), [0]])
     hopeless = _hopeless(z, np.where(usable, high, 0.0), np.where(usable, low, 0.0), tolerance, min_slices)
     heights, tops, bottoms = z.tolist(), high.tolist(), low.tolist()
-    # of the last interval that deviates too much: first of the slices that decide, its end, distance along the radii
-    bad = (-1, -1, 0.0)
     line = (0.0, 0.0)  # the side that was within the tolerance of the last good interval: radius at z = 0, and slope
 
-    def steepest(first: int, end: int) -> float:
-        """Return a bound of distance along the radii by distance square to the side; as in ``_hopeless``."""
-        spread = float(high[first:end].max() - low[first:end].min())
-        climb = spread - min(tops[first] - bottoms[end - 1], tops[end - 1] - bottoms[first])
-        return math.hypot(1.0, climb / (heights[end - 1] - heights[first]))
-
     def good(first: int, end: int) -> bool:
-        nonlocal line, bad
+        nonlocal line
         if holes[end - 1] != holes[first - 1]:
             return False
         if end - first > min_slices:  # all but the last slice are known to be within the tolerance of the line
-            if end == bad[1] and first <= bad[0] and bad[2] > tolerance * steepest(first, end):
-                return False
             radius = line[0] + line[1] * heights[end - 1]
             limit = tolerance * math.hypot(1.0, line[1])
             if tops[end - 1] - limit <= radius <= bottoms[end - 1] + limit:
                 return True
         window = slice(first, end)
-        off, *side, deciding = _least_deviation(z[window], high[window], low[window])
-        if off > tolerance:
-            bad = (first + deciding, end, off * math.hypot(1.0, side[1]))
-            return False
-        line = (side[0], side[1])
-        return True
+        off, *side = _least_deviation(z[window], high[window], low[window])
+        if off <= tolerance:
+            line = (side[0], side[1])
+        return off <= tolerance
 
     ends: list[int] = []
     stop = 0
@@ -315,7 +298,7 @@ def fit_side(
     straight = float(np.median(np.abs(means + offset * math.hypot(1.0, slope) - line))) < 0.15 * limit
     if run[1] > run[0] and (straight or run[1] - run[0] >= 0.97 * (end - first)):
         return StraightSide(first + run[0], first + run[1], column, columns, start, slope, offset)
-    _, start, slope, _ = _least_deviation(z, high, low)
+    _, start, slope = _least_deviation(z, high, low)
     return StraightSide(first, end, column, columns, start, slope)
 
 

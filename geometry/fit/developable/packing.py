@@ -42,12 +42,14 @@ def _bare_beside(
 
     ``more`` could be added; the reasons of ``earlier``, found before the last sheets, hold.
     """
+    from scipy.spatial import cKDTree
+
     tally = BareTally(hull, _covered(sheets, hull, options.tolerance))
     take = tally.take
     if more:
         tally.take_more(len(sheets), _covered(more, hull, options.tolerance))
     for area in earlier:
-        take(area.reason, _among(hull, area))
+        take(area.reason, cKDTree(area.points).query(hull.points)[0] == 0.0)
     take("flat", hull.flat())
     least = f"{options.min_length * 1e3:g} mm long and {math.degrees(options.min_wrap):g} deg wide"
     take(f"curved in two ways, in a corner, or without room for a sheet {least}", np.ones(len(hull), bool))
@@ -60,12 +62,6 @@ def _covered(sheets: Iterable[FittedSheet], hull: SurfaceSamples, distance: floa
     for sheet in sheets:
         covered |= hull.below(sheet.placed, distance)
     return covered
-
-
-def _among(hull: SurfaceSamples, area: BareArea) -> Bools:
-    """Return whether each sample is one of an area, shape (n,)."""
-    inside = set(map(tuple, area.points.tolist()))
-    return np.fromiter((tuple(point) in inside for point in hull.points.tolist()), bool, len(hull))
 
 
 _COARSE_GRID = (100, 53)  # slices, and rays in each

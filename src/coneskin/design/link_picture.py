@@ -223,9 +223,8 @@ def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
 
 def _draw_electrodes(axes: Any, design: SheetDesign, view: _View) -> None:
     """Draw the middle lines of the electrodes, and the ends and edges, where the viewer sees them."""
-    side = design.place.frustum
-    along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
-    for u, phi in _border(design):
+    along, around, border = _border(design)
+    for u, phi in border:
         view.draw_line(axes, *design.outer_face(u, phi), color=INK_COLOUR, lw=1.0)
     for name in "BADC":
         u, phi = design.layout.electrode_middle(name, 0.0, 0.0)
@@ -238,12 +237,12 @@ def _draw_electrodes(axes: Any, design: SheetDesign, view: _View) -> None:
             axes.text(*at, name, color="white", fontsize=8, fontweight="bold", ha="center", va="center", bbox=box)
 
 
-def _border(design: SheetDesign) -> list[tuple[Any, Any]]:
-    """Return slant distances and azimuths of the ends and edges of a sheet."""
+def _border(design: SheetDesign) -> tuple[Any, Any, list[tuple[Any, Any]]]:
+    """Return places along and around a sheet, and those of its ends and edges."""
     side = design.place.frustum
     along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
     ends = [(np.full(len(around), u), around) for u in (0.0, side.slant)]
-    return [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
+    return along, around, [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
 
 
 def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:
@@ -268,7 +267,7 @@ def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weight
         view.draw(axes, lambda _, points: colours(weights.at(points))[:, :3])
         view.draw_frame(axes)
         for design in designs:
-            for u, phi in _border(design):
+            for u, phi in _border(design)[2]:
                 view.draw_line(axes, *design.outer_face(u, phi), color="#d1495b", lw=1.5)
         panels.append(axes)
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), colours), ax=panels, location="bottom", shrink=0.6)

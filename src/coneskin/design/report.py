@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.geometry.drawing.nesting import MaterialBed
-from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
 from .sheets.sheet_design import SheetDesign
@@ -100,7 +99,12 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     ]
     if design.place.bends:
         rows.insert(0, ["side", f"{design.place.kind}: the radii are arc over wrap, the half angle that of the sector"])
-        rows.append(["sharpest bend of the link", f"radius {_sharpest(design.place) * 1e3:.2f} mm"])
+        rows.append(
+            [
+                "sharpest bend of the link",
+                f"radius {1e3 * min(side.radius1, side.radius2) / design.place.sharpest_bend:.2f} mm",
+            ]
+        )
         rows.append(["layers beside their flat sector", f"{data['sector_error_mm']:.3f} mm at most"])
         if data["closing_gap_mm"] is not None:
             rows.append(["gap with which the bends close", f"{data['closing_gap_mm']:.4f} mm"])
@@ -188,11 +192,6 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
         f"contact and uneven material add to it: {along:.3f} mm along, {around:.3f} mm around and {turn:.3f} deg at "
         "most (`design.json` has it at five places). The paper measured 1.6 mm and 0.5 deg."
     )
-
-
-def _sharpest(place: PlacedFrustum) -> float:
-    """Return the smallest radius to which a sheet is bent [m]."""
-    return min(place.frustum.radius1, place.frustum.radius2) / place.sharpest_bend
 
 
 def _vector(values: list[float], unit: str) -> str:

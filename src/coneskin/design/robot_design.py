@@ -88,7 +88,7 @@ def design_robot(
         GeometryError: no link can carry a sheet, the wires buy none, or the folder is in use; nothing is written then.
     """
     options = options or DesignOptions()
-    found: dict[str, tuple[LinkDesign, tuple[SheetDesign, ...]]] = {}
+    found: dict[str, LinkDesign] = {}
     reasons: list[str] = []
     meshes: dict[str, Mesh] = {}
     for name in urdf_links(robot, packages, arguments):
@@ -103,20 +103,20 @@ def design_robot(
         except GeometryError as error:
             reasons.append(f"{name} carries none: {error}")
         else:
-            found[name] = design, design.sheets
+            found[name] = design
     joints = urdf_joints(robot, packages, arguments)
-    for name, (design, sheets) in list(found.items()):
+    for name, design in list(found.items()):
         progress(f"{name}: sweeping the joints beside it")
         swept = _swept(name, joints, meshes)
-        kept = [_clear(sheet.fit, options.stack.thickness, swept) for sheet in sheets if sheet.fit is not None]
-        if any(one is not sheet.fit for one, sheet in zip(kept, sheets, strict=True)):
+        kept = [_clear(sheet.fit, options.stack.thickness, swept) for sheet in design.sheets if sheet.fit is not None]
+        if any(one is not sheet.fit for one, sheet in zip(kept, design.sheets, strict=True)):
             reasons.append(f"{name}: its sheets end before what moves beside it")
             sheets = _assembled(design, [one for one in kept if one is not None], options)
-            found[name] = design, sheets
+            found[name] = dataclasses.replace(design, sheets=sheets)
     sizes = [
         (sheet.layout.active.area(sheet.layout.sheet), name, number)
-        for name, (_, sheets) in found.items()
-        for number, sheet in enumerate(sheets, 1)
+        for name, design in found.items()
+        for number, sheet in enumerate(design.sheets, 1)
     ]
     offered: list[_Offer] = []
     for area, name, number in sorted(sizes, key=lambda size: -size[0]):
@@ -131,7 +131,8 @@ def design_robot(
     with _new_folder(Path(folder), replace) as draft:
         result = RobotDesign(tuple(offered), bought, tuple(reasons))
         links, sensors = [], 0
-        for name, (design, sheets) in found.items():
+        for name, design in found.items():
+            sheets = design.sheets
             wanted = {one.number for one in offered[:bought] if one.link == name}
             if not wanted:
                 continue

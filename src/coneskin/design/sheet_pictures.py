@@ -12,6 +12,7 @@ from typing import Any
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.sector import unroll
 
 from .sheets.sheet_design import SheetDesign
@@ -31,6 +32,12 @@ def _xy(outline: Outline, tolerance: float = 5e-5) -> tuple[list[float], list[fl
     points = [(x * 1e3, y * 1e3) for x, y, _ in flat.vertices]
     points += points[:1] if outline.closed else []
     return [x for x, _ in points], [y for _, y in points]
+
+
+def _at(cone: Frustum, u: float, phi: float) -> tuple[float, float]:
+    """Return where a place of the surface is drawn [mm]."""
+    x, y = drawing_point(cone, u, phi)
+    return 1e3 * x, 1e3 * y
 
 
 def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) -> None:
@@ -71,17 +78,13 @@ def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) ->
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
 
 
-def _draw_cable(axes: Any, design: SheetDesign, cone: Any, wires: Sequence[SheetWire]) -> None:
+def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[SheetWire]) -> None:
     """Draw the wires as they would lie if the link were flat too, on the side of the seam where the cable is."""
     way = design.way
     ends = way.side.startswith("end")
     off = {"end1": (-1.0, 0.0), "end2": (1.0, 0.0), "edge0": (0.0, -1.0), "edge1": (0.0, 1.0)}[way.side]
     tab = 0.5 * design.layout.plan.tab
     turned = math.tau * round((float(way.surface[0, 1]) - 0.5 * cone.wrap) / math.tau)
-
-    def at(u: float, phi: float) -> tuple[float, float]:
-        x, y = drawing_point(cone, u, phi)
-        return 1e3 * x, 1e3 * y
 
     exit_phi = float(way.surface[0, 1]) - turned
     for wire in wires:
@@ -91,14 +94,16 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Any, wires: Sequence[Sheet
         target = (beyond[0], exit_phi) if ends else (float(way.surface[0, 0]), beyond[1])
         if ends and abs(target[1] - wire.phi) > math.pi:  # the shorter way goes across the seam, or around the link
             edge = cone.wrap if wire.phi > target[1] else 0.0
-            axes.plot(*zip(at(wire.u, wire.phi), at(*beyond), at(beyond[0], edge), strict=True), **style)
+            axes.plot(
+                *zip(_at(cone, wire.u, wire.phi), _at(cone, *beyond), _at(cone, beyond[0], edge), strict=True), **style
+            )
             word = "across\nthe seam" if design.has_seam else "around\nthe link"
-            x, y = at(wire.u + 3.5 * off[0] * tab, wire.phi)
+            x, y = _at(cone, wire.u + 3.5 * off[0] * tab, wire.phi)
             axes.text(x, y, f"{name}, {word}", fontsize=7, ha="center", va="center")
             continue
-        run = [at(*(beyond[i] + (target[i] - beyond[i]) * k / 24.0 for i in range(2))) for k in range(25)]
-        axes.plot(*zip(at(wire.u, wire.phi), *run, strict=True), **style)
-    led = [at(float(u), float(phi) - turned) for u, phi in way.surface]
+        run = [_at(cone, *(beyond[i] + (target[i] - beyond[i]) * k / 24.0 for i in range(2))) for k in range(25)]
+        axes.plot(*zip(_at(cone, wire.u, wire.phi), *run, strict=True), **style)
+    led = [_at(cone, float(u), float(phi) - turned) for u, phi in way.surface]
     axes.plot(*zip(*led, strict=True), color=INK_COLOUR, lw=2.5)
     for index, marker, word, length in (
         (way.tie, "s", "cable tie", way.tie_length),
@@ -108,15 +113,11 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Any, wires: Sequence[Sheet
         axes.plot(*zip(led[index], strict=True), marker, color=INK_COLOUR, ms=6, ls="", label=label)
 
 
-def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
+def _dimensions(axes: Any, design: SheetDesign, cone: Frustum) -> None:
     """Draw the dimensions of the flat pattern and the names of the electrodes."""
     wrap, slant, layout = cone.wrap, cone.slant, design.layout
     lift = 0.06 * max(slant, 0.3 * wrap * max(cone.radius1, cone.radius2))
     style = {"ha": "center", "va": "center", "fontsize": 9, "color": INK_COLOUR}
-
-    def at(u: float, phi: float) -> tuple[float, float]:
-        x, y = drawing_point(cone, u, phi)
-        return x * 1e3, y * 1e3
 
     x0, y0, x1, y1 = draw_shape(cone, layout.rim).bounds
     far = 1.5e3 * lift
@@ -141,7 +142,9 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Any) -> None:
     tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
     axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
     for name in "ABCD":
-        axes.text(*at(*layout.electrode_middle(name, 0.5 * slant, 0.42 * wrap)), name, **style, fontweight="bold")
+        axes.text(
+            *_at(cone, *layout.electrode_middle(name, 0.5 * slant, 0.42 * wrap)), name, **style, fontweight="bold"
+        )
 
 
 def _electrode_names(design: SheetDesign, cut: CutSheet) -> list[tuple[str, float, float]]:
@@ -149,8 +152,8 @@ def _electrode_names(design: SheetDesign, cut: CutSheet) -> list[tuple[str, floa
     cone, way = cut.surface, -1.0 if cut.face == "inside" else 1.0
     found = []
     for name in _NAMED_ELECTRODES.get(cut.number, ""):
-        x, y = drawing_point(cone, *design.layout.electrode_middle(name, 0.5 * cone.slant, 0.42 * cone.wrap))
-        found.append((name, 1e3 * way * x, 1e3 * y))
+        x, y = _at(cone, *design.layout.electrode_middle(name, 0.5 * cone.slant, 0.42 * cone.wrap))
+        found.append((name, way * x, y))
     return found
 
 

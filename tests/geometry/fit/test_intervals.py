@@ -27,7 +27,7 @@ def bounds(cells: list[tuple[float, float]], step: float = 0.005) -> tuple[Float
 @given(RADII)
 def test_least_deviation_is_the_linear_programme(cells: list[tuple[float, float]]) -> None:
     z, high, low = bounds(cells)
-    deviation, start, slope, _ = _least_deviation(z, high, low)
+    deviation, start, slope = _least_deviation(z, high, low)
     one = np.ones_like(z)
     # least t with high - t <= a + b z <= low + t
     above = np.stack([-one, -z, -one], axis=1)
@@ -44,7 +44,7 @@ def test_least_deviation_is_the_linear_programme(cells: list[tuple[float, float]
 def test_least_deviation_of_a_straight_side_is_its_spread_across_it() -> None:
     z = np.linspace(-0.1, 0.2, 50)
     radius = 0.07 + np.tan(np.radians(60.0)) * z
-    deviation, start, slope, _ = _least_deviation(z, radius + 0.002, radius - 0.002)
+    deviation, start, slope = _least_deviation(z, radius + 0.002, radius - 0.002)
     assert deviation == pytest.approx(0.002 * np.cos(np.radians(60.0)), abs=1e-12)
     assert start == pytest.approx(0.07, abs=1e-12)
     assert slope == pytest.approx(np.tan(np.radians(60.0)), abs=1e-12)
@@ -53,7 +53,7 @@ def test_least_deviation_of_a_straight_side_is_its_spread_across_it() -> None:
 def test_least_deviation_of_an_arc_is_half_its_sagitta() -> None:
     z = np.linspace(0.0, 0.1, 101)
     arc = 0.003 * (1.0 - ((z - 0.05) / 0.05) ** 2)
-    deviation, _, slope, _ = _least_deviation(z, 0.05 + arc, 0.05 + arc)
+    deviation, _, slope = _least_deviation(z, 0.05 + arc, 0.05 + arc)
     assert deviation == pytest.approx(0.0015, abs=1e-12)
     assert slope == pytest.approx(0.0, abs=1e-12)
 

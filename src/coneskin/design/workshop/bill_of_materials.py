@@ -44,10 +44,11 @@ def bill_of_materials(
         for cut in design.cuts:
             net[cut.material] += sum(part.area for part in cut.parts)
             parts[cut.material].append(f"{design.name} part {cut.number}")
+    strip = " and a strip of 20 x 120 mm to measure"  # in step 2; it is not built in
     items = [
         _BillItem(
             material if "foil" not in material else f"{material}, 0.05 mm, with electrically conductive adhesive",
-            f"{1e4 * net[material]:.0f} cm2 net{_strips(material)}; "
+            f"{1e4 * net[material]:.0f} cm2 net{strip if material.startswith('conductive sheet') else ''}; "
             + ("; ".join(_blank(bed) for bed in beds if bed.material == material) or "larger than the bed"),
             ", ".join(parts[material]),
         )
@@ -113,11 +114,6 @@ def bill_of_materials(
         for size, number in pins.items()
         if number
     ]
-
-
-def _strips(material: str) -> str:
-    """Return what is measured and not built in: the strips of step 2."""
-    return " and a strip of 20 x 120 mm to measure" if material.startswith("conductive sheet") else ""
 
 
 def _blank(bed: MaterialBed) -> str:

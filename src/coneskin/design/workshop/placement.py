@@ -104,9 +104,8 @@ def find_datum_faces(mesh: Mesh) -> tuple[DatumFace, ...]:
             continue
         x, y, z = (float(value) + 0.0 for value in normal)
         found.append(DatumFace("", (x, y, z), offset, size, outline))
-    ranked = sorted(found, key=_area, reverse=True)
     kept: list[DatumFace] = []
-    for face in ranked:
+    for face in sorted(found, key=lambda face: -face.size[0] * face.size[1]):
         if len(kept) < _MAX_FACES and all(np.dot(face.normal, other.normal) < _ALIKE_DIRECTIONS for other in kept):
             kept.append(DatumFace(f"F{len(kept) + 1}", face.normal, face.offset, face.size, face.outline))
     return tuple(kept)
@@ -173,10 +172,6 @@ def _size(outline: Floats, normal: Floats) -> tuple[float, float]:
     widths = np.ptp(flat @ across.T, axis=0)
     narrow = int(widths.argmin())
     return float(np.ptp(flat @ along[narrow])), float(widths[narrow])
-
-
-def _area(face: DatumFace) -> float:
-    return face.size[0] * face.size[1]
 
 
 _STANDS_OUT = 3e-3  # m; what stands out less is no feature that a person finds
