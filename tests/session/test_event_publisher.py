@@ -268,6 +268,25 @@ def test_what_a_broker_does_not_read_is_dropped_and_counted(deaf_broker: int) ->
     publisher.close()
 
 
+def test_an_attempt_to_connect_again_holds_no_program_up(deaf_broker: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
+    from paho.mqtt.client import Client
+
+    let_go, stopped, stop = threading.Event(), threading.Event(), Client.loop_stop
+
+    def hang(client: Client) -> None:
+        let_go.wait(20.0)
+        stop(client)
+        stopped.set()
+
+    publisher = EventPublisher(f"mqtt://127.0.0.1:{deaf_broker}")
+    monkeypatch.setattr(Client, "loop_stop", hang)
+    publisher.close()
+    assert not stopped.is_set()
+    let_go.set()
+    assert stopped.wait(20.0)
+
+
 def test_a_broker_that_is_not_there_is_said_before_anything_is_guarded() -> None:
     pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
     port = free_port()

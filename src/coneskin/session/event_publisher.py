@@ -98,7 +98,9 @@ def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str
     def close() -> None:
         ended.clear()
         if client.disconnect() or ended.wait(_MQTT_CLOSE_TIMEOUT):
-            client.loop_stop()
+            stopping = threading.Thread(target=client.loop_stop, daemon=True)  # it waits for an attempt to connect
+            stopping.start()
+            stopping.join(_MQTT_CLOSE_TIMEOUT)
 
     try:
         client.connect(host, port)
