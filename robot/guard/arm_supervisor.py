@@ -321,7 +321,7 @@ class ArmSupervisor:
         if motion is not None:
             motion.end(out)
         speed = None if state is None or self.state_age.silent(now) else state.speed
-        self._stop.begin(now, speed, command.deceleration)
+        self._stop.begin(now, speed)
         return motion
 
     def _stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:

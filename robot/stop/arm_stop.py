@@ -27,22 +27,17 @@ class ArmStop:
 
     Attributes:
         paths: those that are left.
-        used: paths of the newest stop.
-        first_was_enough: True where the newest stop came to a standstill by the first path alone.
         watch: of the arm that stands.
     """
 
     def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
         self.paths = paths
-        self.used: tuple[StopPath, ...] = ()
-        self.first_was_enough = False
         self.watch = StandstillWatch(limits.standstill)
         self._limits = limits
         self._first = paths[0]
         self._others_move = StopPath.DRIVER not in paths
-        self._order = paths  # of the stop under way
-        self._deceleration = 0.0  # of it [rad/s2]
-        self._monitor: StopMonitor | None = None
+        self._sent: tuple[tuple[StopPath, ...], float] = (), 0.0  # paths of the newest stop in order, deceleration
+        self._monitor: StopMonitor | None = None  # of it
         self._protective_at = 0.0  # when it was last used
 
     def send(self, command: StopProgram | EndReaction, out: StopSink) -> None:
@@ -52,18 +47,25 @@ class ArmStop:
             paths = (StopPath.PROTECTIVE, *(path for path in paths if path is not StopPath.PROTECTIVE))
         for first in paths[:1]:
             out.append(command if first is StopPath.DRIVER else UseStopPath(first, command.deceleration))
-        self._order, self.used = paths, paths[:1]
+        self._sent, self._monitor = (paths, command.deceleration), None
 
-    def begin(self, now: float, speed: float | None, deceleration: float) -> None:
-        """Begin to monitor the stop that was sent at a host time [s], with its deceleration [rad/s2].
+    @property
+    def used(self) -> tuple[StopPath, ...]:
+        """Paths of the newest stop."""
+        return self._sent[0][:1] if self._monitor is None else tuple(self._monitor.used)
 
-        The largest joint speed is None where it is not known [rad/s].
-        """
-        limits, self._deceleration = self._limits, deceleration
-        if self._order[:1] == (StopPath.PROTECTIVE,):
+    @property
+    def first_was_enough(self) -> bool:
+        """True where the newest stop, whose arm stands, took no other path than the first."""
+        return self._monitor is not None and self._monitor.used == [self._first]
+
+    def begin(self, now: float, speed: float | None) -> None:
+        """Begin to monitor the stop that was sent, from a host time [s] and the largest joint speed, if known, on."""
+        order, deceleration = self._sent
+        if order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
-        budget = limits.stop_budget(speed or 0.0, deceleration)
-        self._monitor = StopMonitor(now, speed, self._order, limits, budget)
+        budget = self._limits.stop_budget(speed or 0.0, deceleration)
+        self._monitor = StopMonitor(now, speed, order, self._limits, budget)
         self.watch.end()
 
     def lose(self, paths: frozenset[StopPath], now: float, for_good: bool) -> None:
@@ -84,8 +86,7 @@ class ArmStop:
             return None, 0
         rounds, used = stop.rounds, len(stop.used)
         for path in stop.next_paths(now):
-            out.append(UseStopPath(path, self._deceleration))
-            self.used = tuple(stop.used)
+            out.append(UseStopPath(path, self._sent[1]))
             if path is StopPath.PROTECTIVE:
                 self._protective_at = now
             if len(stop.used) > used:
@@ -99,15 +100,13 @@ class ArmStop:
             whether it is the first that shows a slowdown, and whether the arm stands, which begins the watch.
         """
         stop = self._monitor
-        if stop is None:
+        if stop is None or stop.course.standing_at is not None:
             return False, False
         before = stop.course.slowed_at
         stop.sample(state.time, state.speed, measured_at)
         slows = before is None and stop.course.slowed_at is not None and not stop.use.rippled
         if stop.course.standing_at is None:
             return slows, False
-        self.first_was_enough = stop.used == [self._first]
-        self._monitor = None
         self.watch.begin(state.time, math.inf)
         return slows, True
 
@@ -117,7 +116,7 @@ class ArmStop:
             return
         if state.time - self._protective_at >= PROTECTIVE_PATIENCE * self._limits.escalate:
             self._protective_at = state.time
-            out.append(UseStopPath(StopPath.PROTECTIVE, self._deceleration))
+            out.append(UseStopPath(StopPath.PROTECTIVE, self._sent[1]))
 
     def stay(self, state: ControllerState) -> None:
         """Let the arm stand: at once where no other program can start, else to the end of a watch."""

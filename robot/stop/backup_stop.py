@@ -90,7 +90,7 @@ class StandstillHold:
         self._stop.send(StopProgram(self._deceleration), self)
         self._began = self._due = now = self._clock()
         speed = None if self._state is None or self.states_missing() else self._state.speed
-        self._stop.begin(now, speed, self._deceleration)
+        self._stop.begin(now, speed)
         self._phase = _HoldPhase.STOPPING_AGAIN if self.failed else _HoldPhase.STOPPING
 
     @property

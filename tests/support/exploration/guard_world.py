@@ -287,7 +287,7 @@ class GuardWorld:
             if moves:
                 now = arm.supervision
                 facts += [now.may_move, bool(now.barred)]
-            if (monitor := stop._monitor) is not None:
+            if (monitor := stop._monitor) is not None and monitor.course.standing_at is None:
                 facts += [monitor.used[-1:] == monitor.used, StopPath.PROTECTIVE in monitor.used]
         return tuple(facts)
 
