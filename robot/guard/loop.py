@@ -20,7 +20,7 @@ from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.liveness import BEAT_PERIOD
-from coneskin.robot.driver.messages import Heartbeat, Shutdown, StopProgram
+from coneskin.robot.driver.messages import EndReaction, Heartbeat, Release, SetJointVelocity, Shutdown, StopProgram
 from coneskin.robot.driver.protocol import (
     HeartbeatWriter,
     PayloadReader,
@@ -29,7 +29,7 @@ from coneskin.robot.driver.protocol import (
     SpeedSlider,
     StopConnections,
 )
-from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
+from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, StopPath, UseStopPath
 from coneskin.skin.sources.source import Source, SourceReopening
 
 from .companion_monitor import HELPER_NAMES
@@ -100,6 +100,9 @@ class _Outbox:
 
     def _send(self, output: Command) -> bool:
         ports = self._ports
+        if isinstance(output, (StopProgram, SetJointVelocity, EndReaction, Release)):  # first the one that is in haste
+            channel = ports.driver if ports.watchdog is None else ports.watchdog
+            return channel is not None and channel.send(output.encode())
         if isinstance(output, UseStopPath):
             if output.path is StopPath.WATCHDOG:
                 return ports.watchdog is not None and ports.watchdog.send(StopProgram(output.deceleration).encode())
@@ -110,10 +113,7 @@ class _Outbox:
             return ports.setpoints is not None and ports.setpoints.write(output)
         if isinstance(output, SetpointProgram):
             return isinstance(ports.stops, ProgramStarter) and ports.stops.follow(output)
-        if isinstance(output, SetSpeedSlider):
-            return ports.slider is not None and ports.slider.set(output.fraction)
-        channel = ports.driver if ports.watchdog is None else ports.watchdog
-        return channel is not None and channel.send(output.encode())
+        return ports.slider is not None and ports.slider.set(output.fraction)
 
 
 _HEARTBEAT_BYTES = Heartbeat().encode()

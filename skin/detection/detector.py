@@ -22,7 +22,7 @@ from .events import ReportedTouch, SkinEvent, SkinFault
 from .fault_diagnosis import DIAGNOSED_FAULTS, FaultDiagnosis
 from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
-from .frame.reading import Reading, TouchReading, read
+from .frame.reading import Reading, TouchReading, judge, read
 from .frame.settings import DetectorSettings
 from .frame.timing import FrameTiming
 from .frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak, UntouchedLevel, UntouchedZero
@@ -145,8 +145,17 @@ class Detector:
             self._currents.restart()  # what was learned of them had another zero
         if zero.counts:
             frame = zero.take_off(frame)
-        reading = read(self.sensor, frame, self._inversion, self._currents.noise)
-        whole, fault = reading.level, reading.fault
+        whole, fault = judged = judge(self.sensor, frame, self._currents.noise)
+        level, stuck = whole - self._level.value, None
+        if level >= self._touch and fault is None and alarm is not None and not events and self._begins(whole):
+            stuck = self._stuck.feed(frame)
+            if not stuck:
+                alarm(self.sensor.name, level)
+                alarm = None
+        reading = None
+        if self.touched or whole >= self._release or level >= self._release:
+            reading = read(self.sensor, frame, self._inversion, judged=judged)
+            fault = reading.fault
         if fault is Fault.LEAK and resting and not zero.known:
             self.timing.seen_valid(now)
             return events  # the first frames tell what no current reads
@@ -154,7 +163,6 @@ class Detector:
             self._skip()
             self._report(events, Fault.ZERO, frame, now, zero.excess)
             return events
-        level = whole - self._level.value
         if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
             fault = Fault.GUIDE_DRIVEN
         if self._diagnosis.active and (fault is None or fault in DIAGNOSED_FAULTS):
@@ -173,10 +181,12 @@ class Detector:
             if self._contradictions:
                 self._contradictions = max(0.0, self._contradictions - _CONTRADICTION_DECAY)
             self.timing.seen_valid(now)
-        if self._stuck.feed(frame):
+        if self._stuck.feed(frame) if stuck is None else stuck:
             self._report(events, Fault.STUCK, frame, now)
             return events
-        if self.touched:
+        if reading is None or (level < self._touch and not self.touched):
+            self._while_untouched(events, frame, now, level)
+        elif self.touched:
             matrix = reading.matrix
             firm = self.settings.self_test and fault is None and reading.level >= self.sensor.thresholds.location_level
             if firm and matrix is not None and self._self_test.feed(matrix):
@@ -189,11 +199,14 @@ class Detector:
                 reading = reading._replace(location_valid=False)
             touch = self._places.feed(frame, reading, level, now, self.timing.period)
             self._while_touched(events, frame, touch)
-        elif level >= self._touch:
-            self._before_touch(events, frame, reading, level, now, alarm)
         else:
-            self._while_untouched(events, frame, now, level)
+            self._before_touch(events, frame, reading, level, now, alarm)
         return events
+
+    def _begins(self, whole: float) -> bool:
+        """Tell whether a frame above the threshold begins a touch, whatever the place is that it has, or has not."""
+        certain = self._above + 1 >= self.settings.confirm_frames and self._contradictions <= _MAX_CONTRADICTIONS
+        return certain and not self.touched and whole >= self._touch and not self._diagnosis.active
 
     def _is_change(self, fault: Fault) -> bool:
         """Tell whether a frame's fault may be a contact that came or went between the phases of this one frame.

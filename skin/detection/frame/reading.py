@@ -63,31 +63,43 @@ class Reading(NamedTuple):
         return sensor.place(1.0 - x if sensor.b_positive else x, y if sensor.c_positive else 1.0 - y)
 
 
-def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, noise: float = 0.0) -> Reading:
-    """Work out what a frame says.
+def judge(sensor: Sensor, frame: Frame, noise: float = 0.0) -> tuple[float, Fault | None]:
+    """Work out what a frame says but for the place: the level, and the first reason not to believe it.
 
-    The level is the mean of the two guides in the touch phase over the supply.
+    The level is the mean of the two guides in the touch phase over the supply. Arguments as of ``read``.
+    """
+    supply, bounds = frame.touch_supply, sensor.bounds
+    low, high = bounds.supply_low, bounds.supply_high
+    if not (low <= supply <= high and low <= frame.radial_supply <= high and low <= frame.angular_supply <= high):
+        return 0.0, Fault.DEVICE if frame.status & _STATUS_FAULTS else Fault.SUPPLY
+    level = (frame.touch_c + frame.touch_d) / (2.0 * supply)
+    fault = _fault(sensor, frame, level, noise)
+    if fault is None and frame.driven is not None and _loses_drive(sensor, frame):
+        fault = Fault.LEAD
+    return level, fault
+
+
+def read(
+    sensor: Sensor,
+    frame: Frame,
+    inversion: FrameInversion | None = None,
+    noise: float = 0.0,
+    judged: tuple[float, Fault | None] | None = None,
+) -> Reading:
+    """Work out what a frame says.
 
     Args:
         sensor: the sensor that sent the frame.
         frame: the frame.
         inversion: of this sensor, where it is at hand.
         noise: standard deviation of a reading that was learned [counts]. Thresholds may be raised by it.
+        judged: what ``judge`` says of the frame, where that is known.
 
     Returns:
         the reading. A frame that cannot be believed has ``fault`` set, and then its other values are a guess.
     """
-    sequence, clock_us = frame.sequence, frame.clock_us
-    supply, supply1, supply2 = frame.touch_supply, frame.radial_supply, frame.angular_supply
-    bounds, limits = sensor.bounds, sensor.thresholds
-    low, high = bounds.supply_low, bounds.supply_high
-    if not (low <= supply <= high and low <= supply1 <= high and low <= supply2 <= high):
-        worst = Fault.DEVICE if frame.status & _STATUS_FAULTS else Fault.SUPPLY
-        return Reading(sensor, sequence, clock_us, 0.0, None, False, worst)
-    level = (frame.touch_c + frame.touch_d) / (2.0 * supply)
-    fault = _fault(sensor, frame, level, noise)
-    if fault is None and frame.driven is not None and _loses_drive(sensor, frame):
-        fault = Fault.LEAD
+    level, fault = judge(sensor, frame, noise) if judged is None else judged
+    sequence, clock_us, limits = frame.sequence, frame.clock_us, sensor.thresholds
     if level < limits.release_level:
         return tuple.__new__(Reading, (sensor, sequence, clock_us, level, None, False, fault))  # quicker than Reading()
     matrix = (inversion or FrameInversion(sensor)).invert(frame[6:18])
@@ -98,7 +110,7 @@ def read(sensor: Sensor, frame: Frame, inversion: FrameInversion | None = None, 
     firm = level >= limits.location_level
     if firm and not inside and fault is None:
         fault = Fault.OUT_OF_RANGE
-    spread1, spread2 = limits.guide_spread * supply1, limits.guide_spread * supply2
+    spread1, spread2 = limits.guide_spread * frame.radial_supply, limits.guide_spread * frame.angular_supply
     split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
     split = -spread1 <= split1 <= spread1 and -spread2 <= split2 <= spread2
     return Reading(sensor, sequence, clock_us, level, matrix, firm and inside and split and fault is None, fault)

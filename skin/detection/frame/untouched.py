@@ -165,7 +165,7 @@ class UntouchedZero:
         self._seen: list[float] = []
         self._waited = 0.0
         self._off = 0
-        self.known = self.hidden = False
+        self.known = self.hidden = self._odd = False
 
     def feed(self, frame: Frame, period: float, free: bool) -> bool:
         """Take a frame, as it came, of a sensor that is not touched. Tell whether another zero was found at once.
@@ -183,6 +183,7 @@ class UntouchedZero:
         median = round(sorted(self._seen)[CURRENT_BLOCK // 2])
         self._seen.clear()
         self._off = median - self.nominal
+        self._odd = self.hidden or bool(self.excess)
         self._waited += CURRENT_BLOCK * period
         change = median - self.counts
         if not -self.most <= self._off <= self.most or -_ZERO_REST <= change <= _ZERO_REST:
@@ -204,6 +205,8 @@ class UntouchedZero:
 
     def explains(self, frame: Frame) -> bool:
         """Tell whether the zero is out of its range, or below 0 as a frame of a touch shows."""
+        if not self._odd:
+            return False
         lacking = (frame.touch_c + frame.touch_d) * self._per_guide - frame.touch_current
         return bool(self.excess) or (self.hidden and frame.touch_current > 0 and self.most < lacking < 4 * self.most)
 
