@@ -31,12 +31,13 @@ from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
+_SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
 _SERVICE_PORTS = {
     "rtde": ("RTDE",),
     "dashboard": ("dashboard",),
-    "scripts": ("primary", "secondary", "realtime"),
+    "scripts": _SCRIPT_PORTS,
     "network": tuple(PORTS),
 }
 
@@ -120,7 +121,6 @@ def _each(action: Callable[[str], int | None], names: tuple[str, ...]) -> int | 
     return sum(closed) if closed else True
 
 
-_SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
 _MAX_MADE_UP = 10  # late cycles between two looks at the sockets
 _LOOPBACK_PREFIX = "127."  # of every address that no other computer can reach
@@ -165,6 +165,7 @@ class Server:
         self._cut: set[str] = set()  # services that the network does not reach
         self._fillers: dict[str, socket.socket] = {}
         self._programs = 0
+        self._remote = controller.remote_control
         self._stopping = False
 
     # open and close
@@ -294,6 +295,10 @@ class Server:
                 self.controller.load(result)
         self._interface.turn()
         self.controller.update()
+        if self._remote and not self.controller.remote_control:  # what is opened from now on is read-only
+            for name in _SCRIPT_PORTS:
+                self.drop_all(name)
+        self._remote = self.controller.remote_control
 
     def _publish(self) -> None:
         listening = frozenset(name for name in _SCRIPT_PORTS if self._clients[name])

@@ -2,7 +2,7 @@
 
 | stop path | how |
 |---|---|
-| program | a program of one ``stopj`` on the script port; it replaces the one that runs, whatever started it |
+| program | a program of one ``stopj`` on the primary interface; it replaces the one that runs, whatever started it |
 | command | the dashboard's ``stop`` |
 | slider | the speed slider at 0, over an RTDE connection that is opened for it; the guard has one of its own |
 | protective | ``protective_stop()`` twice: in a program that replaces the one that runs, and in a secondary program |
@@ -11,19 +11,22 @@ A secondary program runs beside the main one and no upload replaces it, so that 
 at once cannot keep the protective stop away. Whether a controller takes the call there is measured by
 scripts/measure_controller.py; where it does not, the program before it does the same as long as nobody replaces it.
 
-A controller in local control refuses the programs and the dashboard's stop, and closes nothing; a connection that was
-opened meanwhile stays read-only after the switch (C210 on the primary interface). So both are proven at the start, by
-what moves nothing: a secondary program writes an output register, and the dashboard answers "is in remote control". It
-is asked again and again, and its refusal of a stop counts as an answer. Software that does not know the question has no
-local control. PolyScope X has no dashboard.
+A controller in local control refuses the programs and the dashboard's stop. A switch to it closes the connection for
+programs, and one that is opened meanwhile stays read-only, also after the switch back: each program over it is answered
+by C210, which the primary interface alone says. So both are proven at the start, by what moves nothing: a secondary
+program writes an output register, and the dashboard answers "is in remote control". It is asked again and again, and
+its refusal of a stop counts as an answer. Software that does not know the question has no local control. PolyScope X
+has no dashboard.
 
-Source: UR script manual, dashboard server manual; which of these stops which motion was measured in a simulation
+Source: UR script manual, dashboard server manual, client interface (messages of errors), issue 459 of Universal Robots'
+ROS driver (what a switch closes); which of these stops which motion was measured in a simulation
 (docs/safety.md, "Stop paths").
 """
 
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from types import MappingProxyType
 from typing import Self
@@ -53,6 +56,14 @@ _LOCAL_CONTROL = (
     "is in local control: it refuses every stop by program or command. Choose Remote Control at the top right of the "
     "pendant, then start again"
 )
+_READ_ONLY = (
+    "is read-only (C210): the controller was in local control when it was opened, or is again. Choose Remote Control "
+    "at the top right of the pendant, then start again"
+)
+#: of an error on the primary interface: length, kind of packet, time, source, kind of message, number of the error
+_ERROR_HEAD = struct.Struct(">IBQBBi")
+_MESSAGE, _ERROR, _READ_ONLY_CODE = 20, 6, 210
+_MAX_PACKET = 1 << 16  # bytes of one that can be; a state has some 1500
 _FIRST_X = 10  # major version of PolyScope X
 
 
@@ -65,12 +76,14 @@ class StopSockets(TcpStops):
             with PolyScope X.
     """
 
-    ports = MappingProxyType({"program": 30003, "command": 29999})  # script interface, dashboard
+    ports = MappingProxyType({"program": 30001, "command": 29999})  # primary interface, dashboard
     advice = "enable it: Settings, Security, Services"
 
     def __init__(self, host: str, timeout: float = 2.0) -> None:
         super().__init__(host, timeout)
         self._said = b""  # by the dashboard, since its last whole line
+        self._rest = b""  # of the primary interface, since its last whole packet
+        self._read_only = False  # which it has said
 
     def __enter__(self) -> Self:
         self._refuse_polyscope_x()
@@ -85,14 +98,36 @@ class StopSockets(TcpStops):
         """Ask the dashboard whether the controller still takes stops, without waiting; ``drain`` takes its answer."""
         self.send("command", _MODE_QUESTION)
 
+    def drain(self) -> list[tuple[str, socket.socket, str]]:
+        """Take what the controller has said; see `TcpStops.drain`. A read-only connection is of no use either."""
+        gone = [
+            (name, sock, f"{why}; it does so where it is switched to local control" if name == "program" else why)
+            for name, sock, why in super().drain()
+        ]
+        if self._read_only and (sock := self._open_ones.pop("program", None)) is not None:
+            gone.append(("program", sock, f"the connection for programs of the controller {self.host} {_READ_ONLY}"))
+        if any(name == "program" for name, _, _ in gone):
+            self._rest, self._read_only = b"", False
+        return gone
+
     def refusal(self, name: str, data: bytes) -> str:
         """Return that the controller is in local control, where the dashboard has said so."""
-        if name != "command":
+        if name == "program":
+            self._look_for_read_only(data)
             return ""
         *lines, self._said = (self._said + data).split(b"\n")
         self._said = self._said[-_MAX_ANSWER:]
         local = any(line.strip().lower() == b"false" or line.lower().startswith(_LOCAL_REFUSAL) for line in lines)
         return f"the controller {self.host} {_LOCAL_CONTROL}" if local else ""
+
+    def _look_for_read_only(self, data: bytes) -> None:
+        self._rest += data
+        while len(self._rest) >= _ERROR_HEAD.size:
+            size, kind, _, _, message, code = _ERROR_HEAD.unpack_from(self._rest)
+            if size > len(self._rest) and size <= _MAX_PACKET:
+                return
+            self._read_only |= (kind, message, code) == (_MESSAGE, _ERROR, _READ_ONLY_CODE)
+            self._rest = self._rest[size:] if 5 <= size <= _MAX_PACKET else b""  # else it is no primary interface
 
     def _prove_remote(self, sock: socket.socket) -> None:
         """Wait for the dashboard's answer: a connection alone proves no stop."""
@@ -139,8 +174,7 @@ class StopSockets(TcpStops):
                 if found == token:
                     return
         remedy = (
-            "its script port is read-only (C210): the controller was in local control when it was opened, or another "
-            "program has closed it. Choose Remote Control at the top right of the pendant, then start again"
+            f"perhaps its connection {_READ_ONLY}"
             if mode == RobotMode.RUNNING
             else "the arm is not powered, or its brakes are not released: power it on, then start again"
         )

@@ -163,7 +163,7 @@ def test_a_stop_goes_out_by_whatever_port_opens():
     for _ in range(4):
         hosts.append(free_host(hosts))
     with ThreadPoolExecutor() as pool:  # each waits for ports that do not answer
-        list(pool.map(stop_by, hosts, [(30003, 29999), (30003, 29999, 30004), (30003,), (29999,)]))
+        list(pool.map(stop_by, hosts, [(30001, 29999), (30001, 29999, 30004), (30001,), (29999,)]))
 
 
 def stop_by(host, numbers):
@@ -176,7 +176,7 @@ def stop_by(host, numbers):
         until(lambda: guard.receive() != [])
         guard.send(Heartbeat().encode())
         guard.close()
-        port, word = (30003, b"stopj(10.000)") if 30003 in numbers else (29999, b"stop\n")
+        port, word = (30001, b"stopj(10.000)") if 30001 in numbers else (29999, b"stop\n")
         until(lambda: word in ports.got[port])
         seen = len(ports.got[port])
         until(lambda: len(ports.got[port]) > seen)  # and again, now and then

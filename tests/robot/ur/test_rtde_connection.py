@@ -6,6 +6,8 @@ import socket
 import threading
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.driver.values import StopPath
@@ -104,12 +106,13 @@ def test_a_controller_in_local_control_is_refused_and_one_that_is_switched_is_to
         controller.call("local control")
         try:
             gone = []
-            while not gone:
+            while stops.sockets():
                 stops.ask()
-                select.select([stops.sockets()["command"]], (), (), PATIENCE)
-                gone = stops.drain()
+                select.select(list(stops.sockets().values()), (), (), PATIENCE)
+                gone += stops.drain()
             assert {name for name, _, _ in gone} == {"program", "command"}
-            assert all("Choose Remote Control" in why for _, _, why in gone)
+            assert all("local control" in why for _, _, why in gone)
+            assert any("Choose Remote Control" in why for _, _, why in gone)
             assert stops.sockets() == {}
             with (
                 pytest.raises(RobotRefused, match="local control: it refuses every stop"),
@@ -120,6 +123,55 @@ def test_a_controller_in_local_control_is_refused_and_one_that_is_switched_is_to
             controller.call("remote control")
             for _, sock, _ in gone:
                 sock.close()
+
+
+def test_a_read_only_connection_is_told_by_the_answer_to_a_stop(controller):
+    """Opened in local control, and the controller is in remote control again: only the program is refused."""
+    with StopSockets(controller.host, PATIENCE) as stops:
+        controller.call("local control")
+        try:
+            gone = []
+            while not gone:
+                select.select([stops.sockets()["program"]], (), (), PATIENCE)
+                gone = stops.drain()
+            assert [name for name, _, _ in gone] == ["program"]
+            assert stops.reopen()
+            assert select.select([stops.sockets()["program"]], (), (), PATIENCE)[0]  # taken while it is local
+        finally:
+            controller.call("remote control")
+        assert stops.use(StopPath.PROGRAM, 5.0)
+        refused = []
+        for _ in range(50):  # states come ten times a second
+            select.select([stops.sockets()["program"]], (), (), PATIENCE)
+            if refused := stops.drain():
+                break
+        assert [name for name, _, _ in refused] == ["program"]
+        assert "is read-only (C210)" in refused[0][2]
+        assert "Choose Remote Control" in refused[0][2]
+        assert stops.reopen()
+        assert stops.use(StopPath.PROGRAM, 5.0)
+        assert stops.drain() == []
+        for _, sock, _ in (*gone, *refused):
+            sock.close()
+
+
+@pytest.mark.parametrize("size", [1, 7, 19, 1400, 70_000])
+def test_what_the_primary_interface_says_is_told_apart_however_it_is_chopped(size):
+    error = bytes.fromhex("0000002714") + bytes(8) + b"\xfd\x06" + (210).to_bytes(4, "big") + bytes(20)
+    other = error.replace((210).to_bytes(4, "big"), (153).to_bytes(4, "big"))
+    state = (1400).to_bytes(4, "big") + b"\x10" + bytes(1395)
+    for said, wanted in ((state + other + state, False), (state + error[:-1], False), (state + error + state, True)):
+        stops = StopSockets("host")
+        for start in range(0, len(said), size):
+            assert stops.refusal("program", said[start : start + size]) == ""
+        assert stops._read_only is wanted
+
+
+@given(st.binary(max_size=200))
+def test_nonsense_on_the_primary_interface_is_no_error(data):
+    stops = StopSockets("host")
+    stops.refusal("program", data)
+    assert len(stops._rest) <= len(data)
 
 
 def test_a_program_that_is_not_seen_to_run_proves_no_stop(controller, monkeypatch):
@@ -245,7 +297,7 @@ def test_no_controller_there():
     with pytest.raises(RobotConnectionError, match=rf"cannot reach the controller {host}:30004"):
         StopSockets(host).__enter__()
     with (
-        served(closed=frozenset({"realtime"})) as controller,
-        pytest.raises(RobotConnectionError, match=rf"cannot reach port 30003 of the controller {controller.host}"),
+        served(closed=frozenset({"primary"})) as controller,
+        pytest.raises(RobotConnectionError, match=rf"cannot reach port 30001 of the controller {controller.host}"),
     ):
         StopSockets(controller.host).__enter__()
