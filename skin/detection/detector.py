@@ -159,7 +159,7 @@ class Detector:
         if fault is Fault.LEAK and resting and not zero.known:
             self.timing.seen_valid(now)
             return events  # the first frames tell what no current reads
-        if ((fault is None and resting) or fault is Fault.LEAK) and zero.explains(frame):
+        if zero.excess and ((fault is None and resting) or fault is Fault.LEAK):
             self._skip()
             self._report(events, Fault.ZERO, frame, now, zero.excess)
             return events
@@ -173,7 +173,7 @@ class Detector:
             self._places.interrupt()
             self._skip()
             if not self._is_change(fault):
-                self._report(events, fault, frame, now)
+                self._report(events, Fault.ZERO if fault is Fault.LEAK and zero.lacks(frame) else fault, frame, now)
                 return events
             if whole < self._touch:
                 return events  # the next frames say what it was

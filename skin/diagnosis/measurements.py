@@ -18,11 +18,12 @@ _MEASURED_FIELDS = slice(Frame._fields.index("touch_c"), Frame._fields.index("dr
 #: The measured fields of a frame, in the order of the wire.
 MEASURED = Frame._fields[_MEASURED_FIELDS]
 _SUPPLY_AT = MEASURED.index("touch_supply")
-_RADIAL_AT, _ANGULAR_AT = MEASURED.index("radial_current"), MEASURED.index("angular_current")
+_TOUCH_AT, _RADIAL_AT, _ANGULAR_AT = (MEASURED.index(f"{phase}_current") for phase in ("touch", "radial", "angular"))
 _GUIDE_PLACES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", "angular_a", "angular_b"))
 _MIN_FRAMES = 8
 _STUCK_FRAMES = 400  # in a row with the same reading
 _REMARKABLE_SHARE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
+_ZERO_SLACK = 2  # counts; a drive current that is no more than this above the zero is none
 _UNTOUCHED_SHARE = 0.03  # of the supply, on both guides of the touch phase together
 _REMARKABLE_HUM = 0.004  # of the supply, on a guide; it moves a place by as much of the sheet
 _NEAR_SHARE = 0.06  # a reading is another one
@@ -123,14 +124,17 @@ def _find_scaling(columns: _Columns, sensor: Sensor | None) -> Finding | None:
 def _find_zero(columns: _Columns) -> Finding | None:
     if max(columns[_SUPPLY_AT]) == 0:
         return Cause.SUPPLY_ZERO.found("the supply reads 0 in every frame")
-    radial, angular = max(columns[_RADIAL_AT]) <= 2, max(columns[_ANGULAR_AT]) <= 2
+    zero = max((count for _, counts in _untouched(columns, (_TOUCH_AT,)) for count in counts), default=0)  # with a bias
+    radial, angular = (max(columns[k]) <= zero + _ZERO_SLACK for k in (_RADIAL_AT, _ANGULAR_AT))
+    if not (radial or angular):
+        return None
+    reads = (
+        f"read{'' if radial and angular else 's'} {f'{zero}, as without a current,' if zero > 2 else 0} in every frame"
+    )
     if radial and angular:
-        return Cause.CURRENTS_ZERO.found("both drive currents read 0 in every frame")
-    if radial:
-        return Cause.RADIAL_CURRENT_ZERO.found("the drive current of the radial phase reads 0 in every frame")
-    if angular:
-        return Cause.ANGULAR_CURRENT_ZERO.found("the drive current of the angular phase reads 0 in every frame")
-    return None
+        return Cause.CURRENTS_ZERO.found(f"both drive currents {reads}")
+    cause = Cause.RADIAL_CURRENT_ZERO if radial else Cause.ANGULAR_CURRENT_ZERO
+    return cause.found(f"the drive current of the {'radial' if radial else 'angular'} phase {reads}")
 
 
 def _find_frozen(columns: _Columns) -> Finding | None:
@@ -197,23 +201,24 @@ def current_remarks(frames: Sequence[Frame], sensor: Sensor) -> list[str]:
 
 def _measure_hum(columns: _Columns) -> float:
     """Return the amplitude of what swings on the untouched guides [counts]; they stand at 0, which cuts half of it."""
-    squares = (sum(count * count for count in column) / len(column) for _, column in _untouched_guides(columns))
+    guides = _untouched(columns, _GUIDE_PLACES)
+    squares = (sum(count * count for count in column) / len(column) for _, column in guides)
     return 2.0 * sqrt(max(squares, default=0.0))
 
 
-def _untouched_guides(columns: _Columns) -> Iterator[tuple[int, list[int]]]:
-    """Yield the place of each guide and its counts while nothing touches the sensor, where these are enough."""
+def _untouched(columns: _Columns, places: Sequence[int]) -> Iterator[tuple[int, list[int]]]:
+    """Yield places and their counts while nothing touches the sensor, where these are enough."""
     touch_c, touch_d, supply = columns[0], columns[1], columns[_SUPPLY_AT]
     untouched = [c + d < _UNTOUCHED_SHARE * s for c, d, s in zip(touch_c, touch_d, supply, strict=True)]
     if sum(untouched) >= _MIN_FRAMES:
-        for k in _GUIDE_PLACES:
+        for k in places:
             yield k, list(itertools.compress(columns[k], untouched))
 
 
 def _find_floating(columns: _Columns) -> Finding | None:
     """Find guides that wander although nothing touches the sensor."""
     supply = median_high(columns[_SUPPLY_AT])
-    for k, counts in _untouched_guides(columns):
+    for k, counts in _untouched(columns, _GUIDE_PLACES):
         column = sorted(counts)
         spread = column[int(0.95 * (len(column) - 1))] - column[int(0.05 * (len(column) - 1))]
         if spread > max(0.02 * supply, 12.0):

@@ -1,7 +1,8 @@
 """Untouched sensor: what is learned of it over quiet frames, as the zero of what a touch adds.
 
 The design's currents will not do: a sheet resistance that is 2 % off would hide what distinguishes two contacts from
-one. Both currents are kept over the supply, which cancels its drift.
+one. Both currents are kept over the supply, which cancels its drift. Where the amplifier's zero creeps, by what the
+touch phase reads without a current, they go with it.
 
 A dead touch phase reads 0 for ever, and so does an untouched sensor. But nothing joins the layers then, so no guide may
 have a potential, and the guides of a phase cannot differ. A leak that grows slowly is learned. What comes suddenly is a
@@ -34,6 +35,8 @@ _PRIOR_NOISE: Final = 0.7  # counts; standard deviation that is assumed at the s
 _ROUNDING_VARIANCE: Final = 1.0 / 12.0  # counts^2; variance of rounding alone
 _CURRENT_JUMP: Final = 0.01  # ratio; an untouched current that is off by this has changed
 _JUMP_DEVIATIONS: Final = 8.0
+_ZERO_CHANGE: Final = 0.4  # counts, of the mean of a block; less is noise of where no current flows
+_ZERO_DEVIATIONS: Final = 4.0
 _THRESHOLD_DEVIATIONS: Final = 7.0  # standard deviations from what noise reaches to a threshold: once in 1e11 frames
 _MAX_GUIDE_THRESHOLD: Final = 0.03  # part of the supply; the least threshold, on a guide, is raised by noise no further
 
@@ -66,6 +69,7 @@ class UntouchedCurrents:
         limits, bounds = sensor.thresholds, sensor.bounds
         current = min(bounds.radial_low, bounds.angular_low) * (1.0 / limits.current_low - 1.0)
         guide = min(_MAX_GUIDE_THRESHOLD, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
+        self._per_guide = bounds.touch_current_per_guide
         self._noisiest = min(guide, current) / _THRESHOLD_DEVIATIONS  # counts
         self.bias = 0.0
         self.radial = self.angular = self._last = 0.0
@@ -74,12 +78,12 @@ class UntouchedCurrents:
     def restart(self) -> None:
         """Learn the currents anew. The noise stays known."""
         self._blocks = self._count = self.frames = 0
-        self._sum1 = self._sum2 = 0.0
+        self._sum0 = self._sum1 = self._sum2 = self._zero = 0.0
 
     def skip(self) -> None:
         """Forget the block that was under way: the sensor is not quiet any more."""
         self._count = 0
-        self._sum1 = self._sum2 = 0.0
+        self._sum0 = self._sum1 = self._sum2 = 0.0
 
     def feed(self, frame: Frame, period: float) -> tuple[Fault, str] | None:
         """Take the currents of a quiet frame.
@@ -91,17 +95,22 @@ class UntouchedCurrents:
         Returns:
             a fault, where a current has changed suddenly, or where there is more noise than thresholds bear, and what.
         """
+        self._sum0 += frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide
         self._sum1 += frame.radial_current / frame.radial_supply
         self._sum2 += frame.angular_current / frame.angular_supply
         self._count += 1
         return None if self._count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
 
     def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
-        mean1, mean2 = self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
+        zero, mean1, mean2 = self._sum0 / CURRENT_BLOCK, self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
         self.skip()
         mixed = mean2 - self._weight * mean1
         if not self._blocks:
-            self.radial, self.angular, self._last = mean1, mean2, mixed
+            self.radial, self.angular, self._last, self._zero = mean1, mean2, mixed, zero
+        elif abs(zero - self._zero) > max(_ZERO_CHANGE, _ZERO_DEVIATIONS * self.noise / math.sqrt(CURRENT_BLOCK)):
+            crept = (zero - self._zero) / supply
+            self.radial, self.angular, self._zero = self.radial + crept, self.angular + crept, zero
+            self._last += (1.0 - self._weight) * crept
         limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
         step1, step2 = mean1 - self.radial, mean2 - self.angular
         if abs(step1) > max(_CURRENT_JUMP * self.radial, limit) or abs(step2) > max(
@@ -139,12 +148,14 @@ def bounded(step: float, most: float) -> float:
 _ZERO_LIMIT: Final = 0.012  # of full scale, that the zero may be off; 0.8 mV before an amplifier of 50, at 3.3 V
 _ZERO_REST: Final = 1  # count, by which it may be off and is not followed: untouched readings are cut off at 0
 _ZERO_STEP: Final = 1.0  # s, in which it is followed by a count
+_ZERO_TIME: Final = 0.5  # s of a look at one that is known: hum of 3 Hz and more goes up and down in it,
+_ZERO_SPREAD: Final = 6.0  # counts of the middle 80 %, more than the noise that most boards have
 
 
 class UntouchedZero:
     """The count that a drive current reads where none flows: the bias of its amplifier, and the offset.
 
-    An untouched sensor draws no current in the touch phase, so every frame shows it. It is the median of a block:
+    An untouched sensor draws no current in the touch phase, so every frame shows it. It is the median of some:
     where there is no bias, half of the noise is cut off at 0. It is taken off all three drive currents.
 
     Args:
@@ -154,6 +165,8 @@ class UntouchedZero:
         counts: what is taken off.
         known: it has been seen.
         hidden: the readings have stood at 0, below which they cannot be.
+        excess: by how much the newest block was out of the range that is taken off; empty where it was not, or far
+            more.
     """
 
     def __init__(self, sensor: Sensor) -> None:
@@ -163,9 +176,9 @@ class UntouchedZero:
         self.most = round(_ZERO_LIMIT * self._full)
         self._per_guide = bounds.touch_current_per_guide
         self._seen: list[float] = []
-        self._waited = 0.0
-        self._off = 0
-        self.known = self.hidden = self._odd = False
+        self._waited = self._since = 0.0
+        self.known = self.hidden = False
+        self.excess = ""
 
     def feed(self, frame: Frame, period: float, free: bool) -> bool:
         """Take a frame, as it came, of a sensor that is not touched. Tell whether another zero was found at once.
@@ -173,20 +186,29 @@ class UntouchedZero:
         Args:
             frame: the frame.
             period: time from frame to frame [s].
-            free: nobody relies on the sensor yet: the zero may be found at once, and need not be followed slowly.
+            free: nobody relies on the sensor yet: another zero may be taken at once.
         """
-        self._seen.append(frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide)
-        if len(self._seen) < CURRENT_BLOCK:
+        self._waited += period
+        self._since += period
+        if self.known and self._since < _ZERO_TIME / CURRENT_BLOCK:
             return False
+        self._since = 0.0
+        seen = self._seen
+        seen.append(frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide)
+        if len(seen) < CURRENT_BLOCK:
+            return False
+        seen.sort()
+        median, spread = round(seen[CURRENT_BLOCK // 2]), seen[-CURRENT_BLOCK // 10] - seen[CURRENT_BLOCK // 10]
+        free = not self.known or (free and spread < _ZERO_SPREAD)  # what swings is followed slowly
         self.known = True
-        self.hidden = max(self._seen) <= 0.0
-        median = round(sorted(self._seen)[CURRENT_BLOCK // 2])
-        self._seen.clear()
-        self._off = median - self.nominal
-        self._odd = self.hidden or bool(self.excess)
-        self._waited += CURRENT_BLOCK * period
+        self.hidden = seen[-1] <= 0.0
+        seen.clear()
+        off = median - self.nominal
+        self.excess = ""
+        if self.most < abs(off) <= 4 * self.most:  # beyond, no amplifier is the cause
+            self.excess = f"{100.0 * off / self._full:+.2f} % of full scale, at most {100.0 * _ZERO_LIMIT:.1f} %"
         change = median - self.counts
-        if not -self.most <= self._off <= self.most or -_ZERO_REST <= change <= _ZERO_REST:
+        if not -self.most <= off <= self.most or -_ZERO_REST <= change <= _ZERO_REST:
             return False
         if free:
             self.counts = median
@@ -196,19 +218,10 @@ class UntouchedZero:
             self.counts += 1 if change > 0 else -1
         return False
 
-    @property
-    def excess(self) -> str:
-        """By how much the newest block was out of the range that is taken off; empty where it was not, or far more."""
-        if not self.most < abs(self._off) <= 4 * self.most:  # beyond, no amplifier is the cause
-            return ""
-        return f"{100.0 * self._off / self._full:+.2f} % of full scale, at most {100.0 * _ZERO_LIMIT:.1f} %"
-
-    def explains(self, frame: Frame) -> bool:
-        """Tell whether the zero is out of its range, or below 0 as a frame of a touch shows."""
-        if not self._odd:
-            return False
+    def lacks(self, frame: Frame) -> bool:
+        """Tell whether the zero is below 0, as the current that a frame of a touch lacks shows."""
         lacking = (frame.touch_c + frame.touch_d) * self._per_guide - frame.touch_current
-        return bool(self.excess) or (self.hidden and frame.touch_current > 0 and self.most < lacking < 4 * self.most)
+        return self.hidden and frame.touch_current > 0 and self.most < lacking < 4 * self.most
 
     def take_off(self, frame: Frame) -> Frame:
         """Return a frame whose drive currents are 0 where none flows; one at full scale stays there."""

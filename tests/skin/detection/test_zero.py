@@ -1,8 +1,10 @@
 """Offset of the amplifier of the drive current: taken off within what parts have, named beyond, and no place is off."""
 
 import math
+import random
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from coneskin.geometry.frustum import Frustum
@@ -10,11 +12,12 @@ from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK, UntouchedZero
-from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
+from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts, find_wrong_measurements
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
+from coneskin.skin.wire import Frame
 
 PLAIN = Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350)))
 PARTS = PLAIN.electronics
@@ -90,12 +93,92 @@ def test_it_is_found_at_once_and_followed_slowly_once_somebody_relies_on_it():
     assert zero.counts == 22
 
 
+def run(offset_at, seconds=8.0, rate=500, sensor=BIASED, touches=()):
+    """Faults and detector of frames whose amplifier is off by counts that change with time, between touches."""
+    chance, detector, faults = np.random.default_rng(1), Detector(sensor), []
+    parts, still = sensor.electronics, expected_counts(sensor)
+    skin = VirtualSkin(sensor, [replace(TOUCH, start=0.0, end=1.0)], rate_hz=200, duration=0.5, model="ladder")
+    touched = list(skin.frames())[-1][1][6:18]
+    for n in range(round(seconds * rate)):
+        time = n / rate
+        exact = np.array((touched if any(a <= time < b for a, b in touches) else still)[:9], float)
+        exact[2::3] += offset_at(time)
+        counts = np.clip(np.rint(exact + chance.normal(0.0, 0.7, 9)), 0, parts.full_count).astype(int).tolist()
+        frame = Frame(36, 0, 0, 0, n, round(1e6 * time), *counts, *still[9:])
+        faults += [event.fault for event in detector.feed(frame, time) if isinstance(event, SkinFault)]
+    return faults, detector
+
+
+@pytest.mark.parametrize("rate", [-0.8, 0.8])
+def test_learned_currents_go_with_a_zero_that_creeps(rate):
+    """After a touch of seconds it is off by counts, and the small current of a slender sheet was called changed."""
+    plain = Sensor(Frustum(0.02, 0.02, 0.6, math.radians(340)))
+    full = plain.electronics.current_full_scale
+    slender = replace(plain, electronics=replace(plain.electronics, current_zero=0.0125 * full))
+    faults, detector = run(lambda t: rate * max(0.0, t - 1.0), 24.0, 200, slender, [(4.0, 10.0), (15.0, 20.0)])
+    assert faults == []
+    assert detector.ready
+    counts = expected_counts(slender)
+    left = 51.0 + rate * 23.0 - detector.zero  # of the zero, in the currents of every frame
+    for learned, at in ((detector._currents.radial, 5), (detector._currents.angular, 8)):
+        assert learned * counts[9] == pytest.approx(counts[at] - 51.0 + left, abs=1.0)
+
+
+@pytest.mark.parametrize(("hertz", "rate"), [(3.0, 500), (5.0, 1000), (10.0, 100)])
+def test_a_zero_that_swings_is_not_followed(hertz, rate):
+    """Not even while nobody relies on it: the currents were learned anew with each swing, and never known."""
+    zero, (frame,) = UntouchedZero(PLAIN), frames(20, 1)
+    found = []
+    for n in range(12 * rate):
+        hum = round(20.0 + 8.0 * math.cos(2.0 * math.pi * hertz * n / rate))
+        found.append(zero.feed(frame._replace(touch_current=hum), 1.0 / rate, free=True))
+    assert sum(found) == 1  # the first block
+    assert zero.counts == pytest.approx(20, abs=3)
+
+
+def test_one_frame_of_a_sensor_without_noise_is_a_contact_that_changes():
+    """Its zero has stood at 0 in every frame, which says nothing of it. Four in a row are no contact any more."""
+    detector, faults, skin = (
+        Detector(PLAIN),
+        [],
+        VirtualSkin(
+            PLAIN, [TOUCH], rate_hz=200, imperfections=Imperfections(noise_counts=0.0), model="ladder", duration=1.6
+        ),
+    )
+    for n, (time, frame) in enumerate(skin.frames()):
+        if n == 200 or 240 <= n < 246:
+            frame = frame._replace(touch_current=frame.touch_current - 90)
+        faults += [(n, event.fault) for event in detector.feed(frame, time) if isinstance(event, SkinFault)]
+    assert faults == [(243, Fault.ZERO)]
+
+
 def test_the_monitor_expects_the_bias_where_no_current_flows():
     expected = dict(zip(MEASURED, expected_counts(BIASED), strict=True))
     plain = dict(zip(MEASURED, expected_counts(PLAIN), strict=True))
     assert expected["touch_current"] == 51
     assert plain["touch_current"] == 0
     assert expected["radial_current"] - plain["radial_current"] == pytest.approx(51, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("dead", "cause"), [("r", "radial_current_zero"), ("a", "angular_current_zero"), ("ra", "currents_zero")]
+)
+@pytest.mark.parametrize("bias", [0, 51])
+def test_a_drive_without_a_current_is_named_beside_a_bias(dead, cause, bias):
+    """It read 51 counts where 428 were expected, and the shunt and the sheets' resistance were to be checked."""
+    chance, seen = random.Random(1), []
+    for n in range(64):
+        counts = list(expected_counts(BIASED if bias else PLAIN))
+        for at, name in ((5, "r"), (8, "a")):
+            counts[at] = bias if name in dead else counts[at]
+        for at in (2, 5, 8):
+            counts[at] = max(0, counts[at] + chance.choice((-1, 0, 1)))
+        seen.append(Frame(36, 0, 0, 0, n, 1000 * n, *counts))
+    for sensor in (BIASED if bias else PLAIN, None):
+        found = find_wrong_measurements(seen, sensor)
+        assert found is not None
+        assert found.item == cause
+        assert ("as without a current" in found.value) == bool(bias)
 
 
 def test_full_scale_stays_full_scale():
