@@ -52,6 +52,12 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
         {"coneskin.scene.values.scene"},
         HEAVY | {"coneskin.geometry", "coneskin.skin", "coneskin.robot", "coneskin.scene.reader"},
     ),
+    "a driver process": (
+        "",
+        "import coneskin.robot.ur.driver_process",
+        {"coneskin.robot.ur.ur_rtde"},
+        HEAVY | {"dataclasses", "inspect", "coneskin.robot.arm.model", "coneskin.robot.guard", "coneskin.scene"},
+    ),
     "design only: unroll": (
         "",
         "from coneskin.cli import main; main(['unroll', '--radius1-mm', '54', '--height-mm', '434'])",

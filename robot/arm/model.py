@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 from coneskin.core.errors import KinematicsError
 
-#: one number for each joint, from the base on
-Joints = tuple[float, ...]
+from .joints import Joints as Joints
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,9 @@ The guard's commands are a letter and doubles, because they are sent from the li
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from coneskin.robot.arm.model import Joints
+from coneskin.robot.arm.joints import Joints
 
 LEAVE = b"leave"  #: of the guarded program to a guard watchdog: it ends, and still listens
 
@@ -75,8 +74,7 @@ class Release(NamedTuple):
         return b"C" + _ONE_NUMBER.pack(self.number)
 
 
-@dataclass(frozen=True, slots=True)
-class Heartbeat:
+class Heartbeat(NamedTuple):
     """Heartbeat of the guard, every ``BEAT_PERIOD``; without it for ``GUARD_SILENCE`` the arm is stopped."""
 
     def encode(self) -> bytes:
@@ -84,8 +82,7 @@ class Heartbeat:
         return b"A"
 
 
-@dataclass(frozen=True, slots=True)
-class Shutdown:
+class Shutdown(NamedTuple):
     """Announcement that the guard ends on purpose, after it has seen the arm stand."""
 
     def encode(self) -> bytes:

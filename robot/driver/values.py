@@ -7,7 +7,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
-from coneskin.robot.arm.model import Joints
+from coneskin.robot.arm.joints import Joints
 
 
 class ControllerState(NamedTuple):

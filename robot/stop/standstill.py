@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coneskin.robot.arm.model import Joints
+from coneskin.robot.arm.joints import Joints
 from coneskin.robot.driver.values import ControllerState
 
 from .stop_monitor import STANDSTILL_SAMPLES

@@ -11,7 +11,6 @@ import math
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 from typing import Any, TextIO
 
 _MAX_DIGITS = 100  # a longer whole number is none that anything counts; as int it would overflow where it meets a float
@@ -107,6 +106,8 @@ def html_card(title: str, rows: Sequence[tuple[str, str]], next_step: str, pictu
         next_step: a call or a command.
         picture: HTML or SVG, as it is.
     """
+    from html import escape  # for a notebook alone, and it takes a while to import
+
     lines = "".join(f"<tr><th style='text-align:left'>{escape(a)}</th><td>{escape(b)}</td></tr>" for a, b in rows)
     shown = f"<div style='max-width:480px'>{picture}</div>" if picture else ""
     return f"{shown}<b>{escape(title)}</b><table>{lines}</table><div>next: <code>{escape(next_step)}</code></div>"
