@@ -76,17 +76,13 @@ def test_the_nearest_name_in_a_path_says_whether_a_mesh_is_the_visual_one(
     assert [link.visual for link in load_link(str(path), "m")] == [visual]
 
 
+def test_a_name_without_a_folder_and_the_nearest_of_two_folders_count() -> None:
+    names = ("maker__meshes_VISUAL_link.stl", "meshes/collision/link.stl", "visual/collision/link.stl")
+    assert [link_design._called_visual(name) for name in names] == [True, False, False]
+
+
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("source", "taken"),
-    [
-        ("meshes/visual/link.stl", True),
-        ("maker__meshes_VISUAL_link.stl", True),
-        ("meshes/collision/link.stl", False),
-        ("link.stl", False),
-        ("visual/collision/link.stl", False),
-    ],
-)
+@pytest.mark.parametrize(("source", "taken"), [("meshes/visual/link.stl", True), ("link.stl", False)])
 def test_a_convex_mesh_is_taken_for_the_link_where_it_is_called_visual(source: str, taken: bool) -> None:
     """A stadium 0.6 m wide; its half tubes are 11 % of it, too little for a mesh that may be a collision hull."""
     phi = np.linspace(0.0, np.pi, 25)

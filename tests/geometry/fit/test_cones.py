@@ -105,7 +105,7 @@ def test_a_rugby_ball_is_two_cones_that_share_the_belt(spoil, tilt: float, shift
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("degrees", sweep([-45.0, 0.0, 3.0, -60.0, -10.0, -0.65, 0.05, 20.0, 60.0], short=3))
+@pytest.mark.parametrize("degrees", sweep([-45.0, 0.0, 3.0, -60.0, -0.65, 0.05], short=3))
 def test_one_cone_of_any_half_angle(degrees: float) -> None:
     height = 0.06 if abs(degrees) > 30.0 else 0.2
     grow = height * math.tan(math.radians(abs(degrees)))
@@ -126,22 +126,21 @@ def test_one_cone_of_any_half_angle(degrees: float) -> None:
 
 @pytest.mark.long
 def test_a_barrel_keeps_its_axis_and_its_tolerance() -> None:
-    fit = find_cones(placed(barrel()))
+    fit = cones(placed(barrel()))
     assert len(fit.sheets) == 2
     # design note: two cones on this barrel deviate by 0.5 mm at least; the mean line by 0.8
     assert all(0.0004 < sheet.max_deviation < 0.001 for sheet in fit.sheets)
     assert off(fit.sheets[0])[0] < 0.001
     assert sum(sheet.length_share for sheet in fit.sheets) > 0.99
-    tight = find_cones(placed(barrel()), tolerance=2e-4, max_sheets=3)
+    tight = cones(placed(barrel()), tolerance=2e-4, max_sheets=3)
     assert len(tight.sheets) == 3
     assert all(sheet.max_deviation <= 2e-4 + 1e-9 for sheet in tight.sheets)
 
 
 @pytest.mark.long
 def test_more_sheets_cover_more_of_a_curved_body() -> None:
-    body = placed(
-        revolve([(float(z), 0.04 + 0.03 * math.sqrt(1.0 - ((z - 0.15) / 0.17) ** 2)) for z in np.linspace(0, 0.3, 61)])
-    )
+    heights = np.linspace(0, 0.3, 31).tolist()
+    body = placed(revolve([(z, 0.04 + 0.03 * math.sqrt(1.0 - ((z - 0.15) / 0.17) ** 2)) for z in heights], segments=64))
     covers = []
     for most in (1, 2, 3):
         fit = cones(body, max_sheets=most)
@@ -162,7 +161,7 @@ def test_bolt_holes_are_bridged_and_said() -> None:
     assert 0.0005 < sheet.bridged_share < 0.005  # six holes of 6 mm on a tube of 300 mm
     assert sheet.bridged_depth == pytest.approx(0.006, abs=1e-4)
     # a sheet does not span 20 mm: it ends at the ring of holes
-    (short,) = find_cones(placed(holed(width=0.020)), max_sheets=1).sheets
+    (short,) = cones(placed(holed(width=0.020)), max_sheets=1).sheets
     assert short.length_share < 0.5
 
 
@@ -233,7 +232,7 @@ def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
     rings = [np.column_stack([np.concatenate([arc, -arc]), np.full(50, z)]) for z in (0.0, 0.2)]
     hull = ConvexHull(np.concatenate(rings))
     body = make_mesh(hull.points, hull.simplices)
-    assert find_cones(body).sheets == ()
+    assert cones(body).sheets == ()
     sheets = find_cones(body, allow_hull=True).sheets
     assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=2e-4)
 
@@ -319,16 +318,7 @@ def test_two_partial_wraps_share_a_tube() -> None:
 
 
 @pytest.mark.long
-def test_the_sheets_do_not_depend_on_the_samples() -> None:
-    one, *others = (find_cones(placed(noisy(rugby(), 2e-4)), samples=count) for count in (6000, 3000, 40_000))
-    for other in others:
-        assert [sheet.placed for sheet in one.sheets] == [sheet.placed for sheet in other.sheets]
-        for a, b in zip(one.sheets, other.sheets, strict=True):
-            assert a.area_share == pytest.approx(b.area_share, abs=0.02)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("body", [rugby, barrel, shoulder, holed], ids=lambda body: body.__name__)
+@pytest.mark.parametrize("body", [barrel, shoulder], ids=lambda body: body.__name__)
 def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-untyped-def]
     mesh = placed(noisy(body(), 1e-4))
     areas = [
@@ -343,9 +333,9 @@ def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-unt
 def test_what_is_advised_works_when_followed() -> None:
     for body in (box(0.06, 0.07, 0.2), revolve([(0.0, 0.04), (0.05, 0.06), (0.1, 0.04)], segments=9)):
         mesh = placed(body)
-        fit = find_cones(mesh)
+        fit = cones(mesh)
         assert fit.sheets == ()
-        assert find_cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
+        assert cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
 
 
 def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> None:
@@ -431,13 +421,9 @@ def test_ur5e_links_from_exploded_collada(name: str, radius: float, length: floa
     assert math.degrees(math.acos(min(1.0, axis_of(sheet)[2]))) < 0.1
     assert sheet.max_deviation <= 0.001
     assert any("welded" in note for note in fit.notes)
-
-
-@pytest.mark.long
-def test_ur5e_forearm_narrows() -> None:
-    sheet = find_cones(link("ur/ur5e/visual/forearm.dae"), max_sheets=1).sheets[0]
-    assert -0.10 < math.degrees(sheet.frustum.half_angle) < -0.04
-    assert unroll(sheet.frustum).r1 > unroll(sheet.frustum).r2
+    if name == "forearm":  # it narrows
+        assert -0.10 < math.degrees(sheet.frustum.half_angle) < -0.04
+        assert unroll(sheet.frustum).r1 > unroll(sheet.frustum).r2
 
 
 @pytest.mark.long
@@ -448,8 +434,6 @@ def test_hull_like_forearm_is_refused_with_the_reason() -> None:
     assert "visual mesh" in fit.reason
     assert fit.nearest is not None
     assert fit.nearest.max_deviation > 0.001  # what is permitted
-    # its other mesh says what has been lost
-    assert find_cones(link("ur/ur5e/visual/forearm.dae")).sheets
 
 
 @pytest.mark.long

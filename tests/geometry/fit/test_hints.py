@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from coneskin.geometry.fit.cones import LinkFit
-from coneskin.geometry.mesh import Mesh, make_mesh
+from coneskin.geometry.mesh import Mesh
 
-from ..synthetic import barrel, frustum, holed, joined, noisy, placed, revolve, rugby, shoulder
+from ..synthetic import barrel, frustum, holed, placed, revolve, shoulder
 from .shared_fits import cones
 from .test_cones import link
 
@@ -20,34 +19,16 @@ ZIGZAG = [(0.0, 0.03), (0.1, 0.05), (0.2, 0.03), (0.3, 0.05)]
 STEPS = [(0.0, 0.05), (0.08, 0.05), (0.081, 0.04), (0.16, 0.04), (0.161, 0.03), (0.24, 0.03)]
 
 
-def fine(mesh: Mesh) -> Mesh:
-    """The same surface of four times as many faces."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-    corners = np.concatenate([a, d, f, d, b, e, f, e, c, d, e, f], axis=1).reshape(-1, 3)
-    return make_mesh(corners, np.arange(len(corners)).reshape(-1, 3), mesh.source)
-
-
-def crossed() -> Mesh:
-    """Two tubes about axes square to each other, as at an elbow."""
-    corners, faces = frustum(0.03, 0.03, 0.12)
-    return placed(joined(frustum(0.05, 0.05, 0.2), (corners @ np.eye(3)[[1, 2, 0]] + [0.0, 0.04, 0.1], faces)))
-
-
 BODIES: dict[str, Callable[[], Mesh]] = {
     "tube": lambda: placed(frustum(0.05, 0.05, 0.2)),
     "double cone": lambda: placed(revolve(ZIGZAG[:3])),
     "zigzag": lambda: placed(revolve(ZIGZAG)),
     "steps": lambda: placed(revolve(STEPS)),
-    "crossed": crossed,
-    "rugby": lambda: placed(noisy(rugby(), 2e-4)),
     "barrel": lambda: placed(barrel()),
     "shoulder": lambda: placed(shoulder()),
     "holed": lambda: placed(holed()),
     "UR10 upper arm": lambda: link("ur/ur10/collision/upperarm.stl"),
     "UR5e forearm": lambda: link("ur/ur5e/visual/forearm.dae"),
-    "UR5e forearm, finer": lambda: fine(link("ur/ur5e/visual/forearm.dae")),
-    "UR5e upper arm": lambda: link("ur/ur5e/visual/upperarm.dae"),
     "UF850 link 4": lambda: link("xarm/uf850_link4.stl"),
 }
 
@@ -82,7 +63,7 @@ def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["barrel", "rugby", "UR5e upper arm", "UF850 link 4"])
+@pytest.mark.parametrize("name", ["barrel", "UF850 link 4"])
 def test_the_tolerance_that_is_advised_gives_a_sheet(name: str) -> None:
     mesh = BODIES[name]()
     tried = 0

@@ -10,24 +10,16 @@ import pytest
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.mesh import Mesh
 
-from ..synthetic import barrel, holed, noisy, placed, rugby, shoulder
+from ..synthetic import noisy, placed, rugby, shoulder
+from .shared_fits import cones
 from .test_cones import link
 
-PLANTED: dict[str, Callable[[], Mesh]] = {
+BODIES: dict[str, Callable[[], Mesh]] = {
     "rugby": lambda: placed(noisy(rugby(), 2e-4)),
-    "barrel": lambda: placed(barrel()),
     "shoulder": lambda: placed(shoulder()),
-    "holed": lambda: placed(holed()),
+    "UR5e forearm": lambda: link("ur/ur5e/visual/forearm.dae"),
 }
-REAL = {
-    name: (lambda name=name: link(name))  # type: ignore[misc]
-    for name in ("ur/ur10/collision/upperarm.stl", "ur/ur5e/visual/forearm.dae", "xarm/uf850_link4.stl")
-}
-LONG = [pytest.param(name, marks=pytest.mark.long) for name in ("barrel", "shoulder", "holed", *REAL)]
-
-
-def mesh_of(name: str) -> Mesh:
-    return {**PLANTED, **REAL}[name]()
+REAL = ("ur/ur5e/visual/forearm.dae", "xarm/uf850_link4.stl")
 
 
 def area(fit: LinkFit) -> float:
@@ -35,20 +27,19 @@ def area(fit: LinkFit) -> float:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["rugby", *LONG])
+@pytest.mark.parametrize("name", BODIES)
 def test_the_sheets_do_not_depend_on_the_samples(name: str) -> None:
-    mesh = mesh_of(name)
-    one, *others = (find_cones(mesh, samples=count) for count in (3000, 12_000, 40_000))
-    assert one.sheets
-    for other in others:
-        assert [sheet.placed for sheet in one.sheets] == [sheet.placed for sheet in other.sheets]
-        for a, b in zip(one.sheets, other.sheets, strict=True):
-            assert a.area_share == pytest.approx(b.area_share, abs=0.03)  # three standard deviations of 3000
+    mesh = BODIES[name]()
+    few, many = (find_cones(mesh, samples=count) for count in (3000, 40_000))
+    assert few.sheets
+    assert [sheet.placed for sheet in few.sheets] == [sheet.placed for sheet in many.sheets]
+    for a, b in zip(few.sheets, many.sheets, strict=True):
+        assert a.area_share == pytest.approx(b.area_share, abs=0.03)  # three standard deviations of 3000
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", REAL)
 def test_a_looser_tolerance_is_never_worse_on_a_real_link(name: str) -> None:
-    mesh = mesh_of(name)
-    areas = [area(find_cones(mesh, tolerance=tolerance)) for tolerance in (7e-4, 1e-3, 1.4e-3, 2e-3)]
+    mesh = link(name)
+    areas = [area(cones(mesh, tolerance=tolerance)) for tolerance in (7e-4, 1e-3, 1.4e-3, 2e-3)]
     assert all(b > 0.99 * a for a, b in itertools.pairwise(areas))

@@ -57,7 +57,7 @@ def test_an_ellipse_becomes_the_circle_at_the_square_of_its_excess() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", TUBES)
+@pytest.mark.parametrize("name", ["oblique cone", "tapered box"])  # the others: below
 def test_a_planted_tube_is_covered_and_lies_where_it_was_planted(name: str) -> None:
     """Facets stand inside by less than 0.04 mm; the sharpest corners here are followed within 0.15 mm."""
     tube = TUBES[name]
