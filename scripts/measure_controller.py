@@ -310,7 +310,7 @@ def measure_watchdog(rig: Rig, repeat: int) -> dict[str, float]:
 
 def measure_switch(rig: Rig) -> dict[str, object]:
     """Return what a controller in local control takes; a person switches it."""
-    input("switch the pendant to Local Control, then press Enter ")
+    answer("switch the pendant to Local Control, then press Enter ")
     rig.sockets.ask()
     wanted = rig.register % 1000 + 1
     rig.sockets.run(f"sec coneskin_marks():\n  write_output_integer_register({_REGISTER}, {wanted})\nend\n")
@@ -320,7 +320,7 @@ def measure_switch(rig: Rig) -> dict[str, object]:
         rig.read()
         said += [why for _, _, why in rig.sockets.drain()]
     taken = rig.register == wanted
-    input("switch it back to Remote Control, then press Enter ")
+    answer("switch it back to Remote Control, then press Enter ")
     rig.sockets.close()
     rig.sockets = StopSockets(rig.host).__enter__()
     return {"program_taken": taken, "seen": bool(said), "new_connections_work": True}
@@ -335,6 +335,14 @@ def measure_protective(rig: Rig) -> dict[str, float]:
     rig.sockets.run("sec coneskin_protective():\n  protective_stop()\nend\n")
     shown = rig.until(lambda: rig.protective, "protective_stop() in a secondary program does nothing", sent)
     return {"shown_s": shown, "stands_s": rig.until(rig.stands, "the protective stop did not stop the arm", sent)}
+
+
+def answer(question: str) -> str:
+    """Return what a person answers."""
+    try:
+        return input(question).strip().lower()
+    except EOFError:
+        raise Stuck("nobody can answer: standard input is closed; run it in a terminal, or with --yes") from None
 
 
 def main() -> int:
@@ -354,10 +362,12 @@ def main() -> int:
     add("--switch", action="store_true", help="measure what a switch to local control does; you switch it")
     add("--yes", action="store_true", help="do not ask before each motion")
     args = parser.parse_args()
+    if not args.file.parent.is_dir():
+        parser.error(f"--file: there is no folder {args.file.parent}; make it first")
 
     def ask(what: str) -> bool:
         print(what)
-        return args.yes or input('  room free, emergency stop in reach? "y" to go on: ').strip().lower() == "y"
+        return args.yes or answer('  room free, emergency stop in reach? "y" to go on: ') == "y"
 
     facts: dict[str, Any] = {
         "host": args.host,
@@ -389,6 +399,9 @@ def main() -> int:
                 rig.leave()
             except (ConeSkinError, Stuck) as exc:
                 print(f"slider and position are not as they were found: {exc}", file=sys.stderr)
+    if "start_s" not in facts:
+        print(f"nothing was measured: {args.file} is not written", file=sys.stderr)
+        return 1
     args.file.write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
     print(f"{args.file}: compare it with `coneskin doctor SCENE --measured {args.file}`")
     return 0 if facts["complete"] else 1

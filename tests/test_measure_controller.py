@@ -97,6 +97,22 @@ def test_it_asks_before_it_moves_and_leaves_the_slider_as_it_was(tmp_path):
         assert simulated.state()["slider"] == 0.3
 
 
+def test_what_was_not_measured_is_no_file_and_nobody_to_ask_is_said(tmp_path):
+    absent = type("Absent", (), {"host": free_host()})
+    done = run(absent, tmp_path / "m.json", "--joints", "6")
+    assert done.returncode == 1
+    assert "cannot reach the controller" in done.stderr
+    assert done.stderr.endswith(f"nothing was measured: {tmp_path / 'm.json'} is not written\n")
+    assert done.stdout == ""
+    assert not (tmp_path / "m.json").exists()
+    assert "make it first" in run(absent, tmp_path / "none" / "m.json").stderr
+    with SimulatedController("UR5e", free_host()) as simulated:
+        done = run(simulated, tmp_path / "m.json", "--joints", "6", "--repeat", "1", answer="")
+    assert done.returncode == 1
+    assert "standard input is closed; run it in a terminal, or with --yes" in done.stderr
+    assert json.loads((tmp_path / "m.json").read_text())["stops"] == []
+
+
 @pytest.mark.long
 def test_an_arm_that_does_not_move_is_no_measurement(tmp_path):
     with SimulatedController("UR5e", free_host()) as simulated:
@@ -104,7 +120,7 @@ def test_an_arm_that_does_not_move_is_no_measurement(tmp_path):
         done = run(simulated, tmp_path / "m.json", "--yes", "--joints", "6", "--speeds", "25", "--motions", "movej")
         assert done.returncode == 1
         assert "did not" in done.stderr
-        assert not json.loads((tmp_path / "m.json").read_text())["complete"]
+        assert not (tmp_path / "m.json").exists()
 
 
 def compare(found, limits, watchdog_hz=4.0):
