@@ -35,7 +35,6 @@ def emit(theirs, name, time=1.0, **details):
 def listen(log, channel):
     """Let the log take what comes over the channel, as a session does."""
     log.monitor = GuardMonitor(log, channel)
-    log.monitor.start()
 
 
 def close(log):

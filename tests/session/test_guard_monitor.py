@@ -27,9 +27,7 @@ def emit(theirs, name, time=1.0, **details):
 def monitored(channel, *watchdogs):
     """Return a log and a running monitor."""
     log = EventLog()
-    monitor = GuardMonitor(log, channel, watchdogs)
-    monitor.start()
-    return log, monitor
+    return log, GuardMonitor(log, channel, watchdogs)
 
 
 @pytest.fixture
@@ -135,13 +133,12 @@ def test_what_is_wrong_with_the_skins_line_is_said_while_the_guard_waits(channel
     monkeypatch.setattr("coneskin.session.guard_monitor._ACTIVATION_TIME", 0.0)
     ours, theirs = channel
     log = EventLog()
-    monitor = GuardMonitor(log, ours, (), lambda why: f"the checksum, because {why[0]}")
     for name in names:
         theirs.send(encode_block(GuardEvent(name, 1.0, {"reasons": ["no frame"]}).block()))
     emit(theirs, "ending", what="done")
     emit(theirs, "guard_exited", what="done")
     theirs.flush()
-    monitor.start()
+    monitor = GuardMonitor(log, ours, (), lambda why: f"the checksum, because {why[0]}")
     assert log.wait_for(("guard_exited",), 5.0)
     theirs.close()
     monitor.close()

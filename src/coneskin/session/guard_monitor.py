@@ -48,16 +48,12 @@ class GuardMonitor:
         self._describe_line = describe_line
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="coneskin guard monitor", daemon=True)
-
-    def start(self) -> None:
-        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
         """Wait for the end of the guard's channel; may be called again, once the other processes have ended."""
         self._closing.set()
-        if self._thread.is_alive():
-            self._thread.join()
+        self._thread.join()
 
     # ---- the thread
 

@@ -304,7 +304,6 @@ class Session:
 
             self._arm = UrRtdeArm(program, self.check, scene.arm.arm_model, scene.arm.host)
         self._monitor = GuardMonitor(self._log, channel, self._processes.watchdogs, self._describe_line)
-        self._monitor.start()
 
     def _await_activation(self) -> None:
         end = time.monotonic() + self._start_timeout

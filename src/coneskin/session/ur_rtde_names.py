@@ -105,14 +105,12 @@ def _move_l(
 def _move_j_ik(
     arm: ArmClient, pose: Sequence[float], speed: float = 1.05, acceleration: float = 1.4, asynchronous: bool = False
 ) -> None:
-    """Move in joint space to a pose of the tool [m, rad]; speed and acceleration as of ``move_j``."""
     arm.move_j_ik(pose, speed, acceleration, wait=not asynchronous)
 
 
 def _move_l_fk(
     arm: ArmClient, q: Sequence[float], speed: float = 0.25, acceleration: float = 1.2, asynchronous: bool = False
 ) -> None:
-    """Move the tool straight to where it is at joint positions [rad]; speed and acceleration as of ``move_l``."""
     arm.move_l_fk(q, speed, acceleration, wait=not asynchronous)
 
 
@@ -151,19 +149,12 @@ def _servo_l(
 
 
 def _stop(arm: ArmClient, a: float = 10.0, asynchronous: bool = False) -> None:  # noqa: ARG001
-    """Stop the arm with a deceleration [rad/s2, or m/s2 of the tool]."""
     arm.stop(a)
 
 
 def _stop_j(arm: ArmClient, a: float = 2.0, asynchronous: bool = False) -> None:  # noqa: ARG001
     """Stop the arm with a deceleration [rad/s2]; this method of ur_rtde returns nothing."""
     arm.stop(a)
-
-
-def _progress(arm: ArmClient) -> int:
-    """Return the number of the way point to which a move goes, from 0; -1 where none runs."""
-    waypoint = arm.progress()
-    return -1 if waypoint is None else waypoint
 
 
 class _AsyncOperationStatus(NamedTuple):
@@ -184,7 +175,6 @@ class _AsyncOperationStatus(NamedTuple):
 
 
 def _set_payload(arm: ArmClient, mass: float, cog: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-    """Set what the arm carries: mass [kg] and its centre in the flange's frame [m]."""
     arm.set_payload(mass, cog)
 
 
@@ -199,11 +189,6 @@ def _read(variable: str) -> _Method:
         return list(value) if isinstance(value, tuple) else value
 
     return _Method(read, f'states.value("{variable}")')
-
-
-def _is_steady(arm: ArmClient) -> bool:
-    """Tell whether no joint is faster than ``_STEADY_SPEED``."""
-    return arm.states.reading().speed < _STEADY_SPEED
 
 
 def _bit(variable: str) -> Callable[[ArmClient, int], bool]:
@@ -224,11 +209,6 @@ def _set_analog(kind: str) -> _Method:
 def _set_register(number_type: type) -> _Method:
     write = _true(lambda arm, number, value: arm.outputs.set_register(number, number_type(value)))
     return _Method(write, "outputs.set_register")
-
-
-def _init_period(_: ArmClient) -> timedelta:
-    """Return when a period begins, for ``wait_period``."""
-    return timedelta(seconds=time.monotonic())
 
 
 def _wait_period(_: ArmClient, t_cycle_start: timedelta) -> None:
@@ -280,14 +260,17 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         "stopJ": _Method(_stop_j, "stop", f"never asynchronous; {_STOP_NOTE}"),
         "stopL": _Method(_true(_stop), "stop", f"never asynchronous; {_STOP_NOTE}"),
         "stopScript": _Method(_true(_stop), "stop", "stops the arm; the session ends the program on the controller"),
-        "getAsyncOperationProgress": _Method(_progress, "progress"),
+        "getAsyncOperationProgress": _Method(lambda arm: -1 if (at := arm.progress()) is None else at, "progress"),
         "getAsyncOperationProgressEx": _Method(
             lambda arm: _AsyncOperationStatus(arm.progress()), "progress", "isAsyncOperationRunning and progress alone"
         ),
         "setTcp": _Method(_true(ArmClient.set_tcp), "set_tcp", "while the arm stands"),
         "setPayload": _Method(_true(_set_payload), "set_payload", "while the arm stands"),
         **{name: _ask(name) for name in _ASKED_NAMES},
-        "isSteady": _Method(_is_steady, "states.reading().speed", f"no joint faster than {_STEADY_SPEED:g} rad/s"),
+        "isSteady": _Method(
+            lambda arm: arm.states.reading().speed < _STEADY_SPEED,
+            *("states.reading().speed", f"no joint faster than {_STEADY_SPEED:g} rad/s"),
+        ),
         "isProgramRunning": _Method(
             lambda arm: arm.states.reading().program_running, "states.reading().program_running"
         ),
@@ -317,7 +300,7 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         "setAnalogOutputCurrent": _set_analog("current"),
         "setInputIntRegister": _set_register(int),
         "setInputDoubleRegister": _set_register(float),
-        "initPeriod": _Method(_init_period, "time.monotonic"),
+        "initPeriod": _Method(lambda _: timedelta(seconds=time.monotonic()), "time.monotonic"),
         "waitPeriod": _Method(_wait_period, "time.sleep", "periods of 2 ms"),
         "isConnected": _Method(lambda arm: arm.connected, "connected"),
         "disconnect": _Method(lambda arm: arm.close(), "close", "the arm stays guarded until the session ends"),
