@@ -2,11 +2,13 @@
 
     python -m bench design-assembly FOLDER            # every STL, DAE and OBJ in it, three sheets at most
     python -m bench design-assembly --sheets 4 LINK ...
+    python -m bench design-assembly --robot arm.urdf SKIN   # a folder of coneskin design arm.urdf --wires N
 
-Each link is designed and written; what is checked is read from its design.json alone. Solids are made of its numbers by
-trimesh and cut with each other by Manifold; against the link, whose mesh is seldom closed, embree's rays decide, most
-of fourteen for each corner. Nothing of the placer is used. Two bodies interfere if they share more than 1 mm3, and a
-body and the link if a corner lies more than 1 mm inside. A side that is not round is laid out by ``Developable``.
+Each link is designed and written; what is checked is read from its design.json alone. Of a robot, the bodies on each
+link are held against the links beside it as well, every 5 degrees of the joint between. Solids are made of the numbers
+by trimesh and cut with each other by Manifold; against the link, whose mesh is seldom closed, embree's rays decide,
+most of fourteen for each corner. Nothing of the placer is used. Two bodies interfere if they share more than 1 mm3, and
+a body and the link if a corner lies more than 1 mm inside. A side that is not round is laid out by ``Developable``.
 
 "covered" is the area of the sheets, "active" that in which a touch is located, both over the hull. The first bounds the
 second for these sheets. The time includes the search and the files.
@@ -16,10 +18,11 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import json
 import statistics
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +31,19 @@ import trimesh
 
 import coneskin as cs
 from bench.report import head
+from coneskin.commands.terminal import add_urdf_options, urdf_options
 from coneskin.core.errors import ConeSkinError
+from coneskin.design.link_design import load_link
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
+from coneskin.geometry.urdf import UrdfJoint, urdf_joints, urdf_links
 
 SUFFIXES = (".stl", ".dae", ".obj")
 LEAST_VOLUME = 1.0  # mm3
 LEAST_DEPTH = 1.0  # mm
+SWEEP_STEP = np.radians(5.0)
 CABLE_RADIUS, TIE, CONNECTOR = 1.9, (12.0, 12.0, 5.0), (11.0, 13.0, 6.0)  # mm; boxes across, along, high
 Place = Callable[[Any, Any, Any], np.ndarray]
 
@@ -123,7 +130,8 @@ def bodies_of(sheet: dict[str, Any], thickness: float) -> Iterator[tuple[str, An
     yield "sheet", shell(place, (0.0, cone["slant_mm"]), (inside, wrap - inside), (0.1, thickness))
     radius = {"end1": cone["radius1_mm"], "end2": cone["radius2_mm"]}
     tab_height = 0.5 * thickness
-    slope = np.tan(np.radians(sheet["cable"]["tab_rise_deg"]))
+    rise = sheet["cable"]["tab_rise_deg"]
+    slope = np.inf if rise == 90.0 else np.tan(np.radians(rise))
     for corners in sheet["electrodes"].values():
         for corner in corners:
             if "tab_width_mm" not in corner:
@@ -135,6 +143,13 @@ def bodies_of(sheet: dict[str, Any], thickness: float) -> Iterator[tuple[str, An
                 ends = sorted((u + 0.2 * away, u + long * away))
                 rising = _risen(place, slope, lambda u_at, _, rim=u: np.abs(u_at - rim))
                 span = phi - half / radius[side], phi + half / radius[side]
+            elif not np.isfinite(slope):  # it stands up from the seam
+                thin = 0.25 / (cone["radius1_mm"] + (cone["radius2_mm"] - cone["radius1_mm"]) * u / cone["slant_mm"])
+                yield (
+                    "tab",
+                    shell(place, (u - half, u + half), (phi - thin, phi + thin), (tab_height, tab_height + long)),
+                )
+                continue
             else:
                 share = u / cone["slant_mm"]
                 around = (1.0 - share) * cone["radius1_mm"] + share * cone["radius2_mm"]
@@ -204,12 +219,67 @@ def interferences(data: dict[str, Any], link: Any) -> list[str]:
     return [f"{what} ({size:.1f} {'mm' if 'link' in what else 'mm3'})" for what, size in found.items()]
 
 
+def swept(data: dict[str, Any], link: str, joints: Sequence[UrdfJoint], meshes: dict[str, Any]) -> list[str]:
+    """Return which bodies of a link a link beside it meets, in words, over the range of the joint between.
+
+    Args:
+        data: content of the design.json of the link.
+        link: its name.
+        joints: of the robot.
+        meshes: of its links [mm].
+    """
+    worst: dict[str, float] = {}
+    bodies = [
+        (f"{name} {number}", np.vstack([solid.vertices, trimesh.sample.sample_surface(solid, 500, seed=1)[0]]))
+        for number, sheet in enumerate(data["sheets"], 1)
+        for name, solid in bodies_of(sheet, sheet["thickness_mm"])
+    ]
+    points = np.concatenate([corners for _, corners in bodies])
+    owner = np.repeat(np.arange(len(bodies)), [len(corners) for _, corners in bodies])
+    for joint in joints:
+        other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
+        if other not in meshes:
+            continue
+        low, high = meshes[other].bounds
+        for angle in np.linspace(joint.lower, joint.upper, int((joint.upper - joint.lower) / SWEEP_STEP) + 2):
+            place = np.eye(4)
+            place[:3, :3], place[:3, 3] = joint.origin.rotation, 1e3 * np.array(joint.origin.translation)
+            place = place @ trimesh.transformations.rotation_matrix(angle, joint.axis)
+            moved = trimesh.transform_points(points, np.linalg.inv(place) if link == joint.parent else place)
+            near = np.flatnonzero(((moved > low) & (moved < high)).all(axis=1))
+            for number in np.unique(owner[near]):
+                depth = depth_in_link(moved[near[owner[near] == number]], meshes[other])
+                key = f"{bodies[number][0]} in {other}"
+                worst[key] = max(worst.get(key, 0.0), depth)
+    return [f"{what} ({depth:.1f} mm)" for what, depth in worst.items() if depth > LEAST_DEPTH]
+
+
+def check_robot(robot: Path, skin: Path, **urdf: Any) -> None:
+    """Print what interferes on each link of a robot, and with the links beside it."""
+    meshes = {}
+    for name in urdf_links(robot, **urdf):
+        mesh = next(load_link(f"{robot}#{name}", **urdf)).mesh
+        meshes[name] = trimesh.Trimesh(1e3 * mesh.vertices, mesh.faces, process=False)
+    joints = urdf_joints(robot, **urdf)
+    for file in sorted(skin.glob("*/design.json")):
+        data, name = json.loads(file.read_text()), file.parent.name
+        found = interferences(data, meshes[name]) + swept(data, name, joints, meshes)
+        print(f"{name:30s}{len(data['sheets']):7d} sheets  {'; '.join(found) or 'none'}", flush=True)
+
+
 def main() -> None:
     """Design every link, check it, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("links", nargs="+", type=Path, metavar="LINK", help="meshes, or folders of them")
     parser.add_argument("--sheets", type=int, default=3, help="sheets at most (default 3)")
+    parser.add_argument("--robot", type=Path, metavar="URDF", help="of the robot whose skins are in the folders")
+    add_urdf_options(parser.add_argument)
     arguments = parser.parse_args()
+    if arguments.robot is not None:
+        print(head("trimesh", "manifold3d", "embreex"))
+        for skin in arguments.links:
+            check_robot(arguments.robot, skin, **urdf_options(arguments))
+        return
     files = [
         file
         for path in arguments.links

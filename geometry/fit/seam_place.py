@@ -18,8 +18,7 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cones import LinkFit
-from .surface_samples import SurfaceSamples
-from .touch_weights import TouchWeights, exposure_weights
+from .touch_weights import TouchWeights, free_shares
 
 _AZIMUTH_COUNT = 36
 _ROW_COUNT = 21  # along a sheet; most of what shields a tube stands beyond its ends
@@ -78,9 +77,8 @@ def _touches_around(placed: PlacedFrustum, rays: RayCaster, weights: TouchWeight
     u = (np.arange(_ROW_COUNT) + 0.5) * side.slant / _ROW_COUNT
     phi = np.arange(_AZIMUTH_COUNT) * math.tau / _AZIMUTH_COUNT
     points, normals = placed.place(u[:, None], phi[None, :])
-    count = _ROW_COUNT * _AZIMUTH_COUNT
-    samples = SurfaceSamples(points.reshape(-1, 3), normals.reshape(-1, 3), np.full(count, -1), side.area / count)
-    free = exposure_weights(samples, rays).weights * (1.0 if weights is None else weights.at(samples.points))
+    points, normals = points.reshape(-1, 3), normals.reshape(-1, 3)
+    free = free_shares(points, normals, rays) * (1.0 if weights is None else weights.at(points))
     return np.asarray(free.reshape(_ROW_COUNT, _AZIMUTH_COUNT).mean(axis=0))
 
 

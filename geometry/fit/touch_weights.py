@@ -122,21 +122,26 @@ def read_touch_weights(path: str | Path) -> TouchWeights:
 
 
 def exposure_weights(hull: SurfaceSamples, rays: RayCaster) -> TouchWeights:
-    """Return the exposure of a link: the share of the half-space above each place from which it can be reached.
+    """Return the exposure of a link, as ``free_shares`` of its hull; where other links stand, name a map."""
+    return TouchWeights(hull.points, free_shares(hull.points, hull.normals, rays), "exposure")
 
-    Rays leave each sample in directions spread evenly over the hemisphere about its normal, weighted by their cosine;
-    those that meet the link count nothing. A convex body has the weight 1 everywhere; the corner between two housings
-    has less. Other links are not known: where they stand, name a map.
+
+def free_shares(points: Floats, normals: Floats, rays: RayCaster) -> Floats:
+    """Return the share of the half-space above each place from which it can be reached, shape (n,).
+
+    Rays leave each place in directions spread evenly over the hemisphere about its normal, weighted by their cosine;
+    those that meet the mesh count nothing. A convex body has the share 1 everywhere; the corner between two housings
+    has less.
 
     Args:
-        hull: samples of the link.
-        rays: a ray caster of the same mesh.
+        points: places on a mesh [m], shape (n, 3).
+        normals: unit outward normals there, shape (n, 3).
+        rays: a ray caster of the mesh.
     """
     turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(_RAY_COUNT)  # the golden angle spreads them evenly
     out = np.sqrt((np.arange(_RAY_COUNT) + 0.5) / _RAY_COUNT)  # evenly over the disc: by the cosine over the hemisphere
     spread = np.stack([out * np.cos(turn), out * np.sin(turn), np.sqrt(1.0 - out**2)], axis=1)
-    frames = np.array([np.stack([*perpendicular_vectors(normal), normal], axis=1) for normal in hull.normals])
+    frames = np.array([np.stack([*perpendicular_vectors(normal), normal], axis=1) for normal in normals])
     ways = np.einsum("nij,rj->nri", frames, spread).reshape(-1, 3)
-    starts = np.repeat(hull.points + _FINGER_LIFT * hull.normals, _RAY_COUNT, axis=0)
-    free = np.isinf(rays.cast(starts, ways)[0]).reshape(-1, _RAY_COUNT)
-    return TouchWeights(hull.points, free.mean(axis=1), "exposure")
+    starts = np.repeat(points + _FINGER_LIFT * normals, _RAY_COUNT, axis=0)
+    return np.asarray(np.isinf(rays.cast(starts, ways)[0]).reshape(-1, _RAY_COUNT).mean(axis=1))

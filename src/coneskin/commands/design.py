@@ -157,7 +157,8 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
     design = design_robot(args.link, args.output, args.wires, **common)
     for count, one in enumerate(design.offered, 1):
         bought = "" if count <= design.bought else ", not bought"
-        print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link}, {1e4 * one.area:.1f} cm2{bought}")
+        area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"
+        print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{bought}")
     print("\n".join(design.reasons))
     folder = shlex.quote(str(args.output))
     print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}; on another arm than a UR: --skin-only")

@@ -229,6 +229,21 @@ class LinkDesign:
     folder: Path | None = None
     data: Mapping[str, Any] = field(default_factory=dict)
 
+    def written(self, folder: str | Path, source: str, **options: Any) -> LinkDesign:
+        """Return the design, written to a folder as that of a file, with options of ``write_design``."""
+        data = write_design(
+            folder,
+            self.sheets,
+            fit=self.fit,
+            mesh=self.mesh,
+            title=self.name,
+            source=source,
+            frame=self.frame,
+            notes=self.notes,
+            **options,
+        )
+        return dataclasses.replace(self, folder=Path(folder), data=data)
+
     def __repr__(self) -> str:
         sheets = "; ".join(repr(sheet) for sheet in self.sheets)
         return f"<LinkDesign {self.name!r}: {sheets}; {self.folder or 'not written'}>"
@@ -346,20 +361,7 @@ def design_link(
         for note in left_out:
             progress(f"note: {note}")
     sheets = cover_seams(sheets, mesh)
-    data: dict[str, Any] = {}
-    if folder is not None:
-        data = write_design(
-            folder,
-            sheets,
-            fit=fit,
-            mesh=mesh,
-            title=name,
-            source=origin or name,
-            frame=frame,
-            notes=notes,
-            options=files,
-            pictures=pictures,
-            replace=replace,
-            progress=progress,
-        )
-    return LinkDesign(name, sheets, fit, mesh, frame, notes, None if folder is None else Path(folder), data)
+    design = LinkDesign(name, sheets, fit, mesh, frame, notes)
+    if folder is None:
+        return design
+    return design.written(folder, origin or name, options=files, pictures=pictures, replace=replace, progress=progress)

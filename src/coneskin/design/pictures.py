@@ -137,7 +137,7 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
 
 
 def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], bought: int) -> None:
-    """Draw what active area [m2] each number of wires buys on a robot.
+    """Draw what touchable area [m2] each number of wires buys on a robot.
 
     Args:
         file: to write.
@@ -155,5 +155,5 @@ def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[s
         axes.plot(*zip(*points[1 : bought + 1], strict=True), "o", color="#2a7fb8")
         for at, name in zip(points[1:], names, strict=True):
             axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
-        axes.set(xlabel="wires", ylabel="active area [cm2]")
+        axes.set(xlabel="wires", ylabel="touchable active area [cm2]")
         figure.savefig(file, dpi=130)

@@ -1,7 +1,9 @@
 """Design of the skin of a whole robot: the sheets of all its links that one budget of wires buys.
 
-Each link is designed as one alone is. Where a link that moves beside it comes in the way, its sheets end before. Every
-sheet costs four wires, so the sheets that sense on most area come first: that is the most for each number of wires.
+Each link is designed as one alone is, but clear of what moves beside it: over the whole range of a joint the link on
+its other side takes a space, before which sheets end, and in which no tab, tie or cable lies. Every sheet costs four
+wires, so those come first on whose active area most can be touched: that is the most for each number of wires. What can
+be touched is the share of the half-space above it that the whole robot leaves free, over poses drawn from the joints.
 """
 
 from __future__ import annotations
@@ -11,29 +13,37 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from coneskin.core.arrays import Bools, Floats
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.urdf import UrdfJoint, urdf_joints, urdf_links
 
-from .folder import DESIGN_FILE, FileOptions, _new_folder, write_design
-from .link_design import LinkDesign, design_link, load_link
-from .sheets.cable_way import SheetBody
-from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
+from .folder import DESIGN_FILE, FileOptions, _new_folder, check_target
+from .link_design import LinkDesign, _fit_link, room_for
+from .sheets.sheet_design import DesignOptions, design_assembly
 
 if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
     from coneskin.geometry.fit.fitted_sheet import FittedSheet
-    from coneskin.geometry.mesh import Mesh
 
 _WIRES_PER_SHEET = 4
-_SWEEP_STEP = math.radians(10.0)
-_SWEEP_CLEARANCE = 3e-3  # m; of a sheet from what moves beside it
+_SWEEP_SAMPLES = 20_000  # of a link that moves beside another
+_SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
+_SWEEP_NEIGHBORS = 24  # samples near a place in its section through the axis, of which one must come by it
+_SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
+_SWEEP_ROW = 2e-3  # m; along a sheet
 _LEAST_SLANT = 0.03  # m; a shorter rest of a sheet is not offered
+_POSE_COUNT = 12
+_TOUCH_GRID = (6, 24)  # places of an active area along and around
 
 
 class _Offer(NamedTuple):
@@ -41,9 +51,10 @@ class _Offer(NamedTuple):
 
     link: str
     number: int  #: on that link
-    area: float  #: active [m2]
+    active: float  #: area [m2]
+    area: float  #: of that, what can be touched [m2]
     wires: int  #: with all before
-    total: float  #: active area with all before [m2]
+    total: float  #: area that can be touched, with all before [m2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +62,7 @@ class RobotDesign:
     """The skin of a robot.
 
     Attributes:
-        offered: all sheets, in the order in which they are bought: the curve of active area against wires.
+        offered: all sheets, in the order in which they are bought: the curve of touchable area against wires.
         bought: how many of them the wires buy.
         reasons: why a link carries none, or its sheets are shortened; one sentence each.
     """
@@ -59,6 +70,80 @@ class RobotDesign:
     offered: tuple[_Offer, ...]
     bought: int
     reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _SweptLink:
+    """The space that a link takes over the range of the joint between it and the next, in the frame of that next one.
+
+    Attributes:
+        axis: pose of the joint, whose axis is z.
+        places: distance from the axis, height and azimuth of samples of the link [m, m, rad], shape (n, 3).
+        lower: least angle by which they are turned [rad].
+        upper: largest angle [rad].
+    """
+
+    axis: Pose
+    places: Floats
+    lower: float
+    upper: float
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.places[:, :2])
+
+    def near(self, points: Floats, distance: float) -> Bools:
+        """Return whether each point, shape (n, 3) [m], is nearer to the space than a distance [m]."""
+        radius, height, azimuth = _about(self.axis, points).T
+        reach = distance + _SAMPLE_RADIUS
+        apart, number = self._tree.query(
+            np.stack([radius, height], axis=1), _SWEEP_NEIGHBORS, distance_upper_bound=reach
+        )
+        met = np.isfinite(apart)
+        slack = reach / np.maximum(radius, reach)[:, None]
+        turned = azimuth[:, None] - self.places[np.where(met, number, 0), 2] - self.lower + slack
+        return np.asarray((met & (turned % math.tau <= self.upper - self.lower + 2.0 * slack)).any(axis=1))
+
+
+def _about(axis: Pose, points: Floats) -> Floats:
+    """Return distance from an axis, height along it and azimuth of points, shape (n, 3)."""
+    x, y, z = axis.inverse().apply_all(points).T
+    return np.stack([np.hypot(x, y), z, np.arctan2(y, x)], axis=1)
+
+
+def _swept_beside(link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh]) -> list[_SweptLink]:
+    """Return the spaces of the links next to one."""
+    from coneskin.geometry.fit.surface_samples import sample_surface
+
+    spaces = []
+    for joint in joints:
+        other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
+        if other is None or other not in meshes:
+            continue
+        mesh = meshes[other]
+        points = sample_surface(mesh, RayCaster(mesh), _SWEEP_SAMPLES).points
+        child = Pose.along(joint.axis)
+        parent = joint.origin @ child
+        if link == joint.parent:
+            spaces.append(_SweptLink(parent, _about(child, points), joint.lower, joint.upper))
+        else:
+            spaces.append(_SweptLink(child, _about(parent, points), -joint.upper, -joint.lower))
+    return spaces
+
+
+def _assembled(
+    design: LinkDesign, fits: Sequence[FittedSheet], options: DesignOptions, beside: Sequence[_SweptLink]
+) -> LinkDesign:
+    """Return a link with sheets at some places, and a note why not for each that finds no room."""
+    if design.fit is None or not fits:
+        return dataclasses.replace(design, sheets=())
+    fit = dataclasses.replace(design.fit, sheets=tuple(fits), bare_areas=())
+    named = dataclasses.replace(options, link=design.name)
+    sheets, left_out = design_assembly(fit, named, design.mesh, beside=beside)
+    fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
+    return dataclasses.replace(design, sheets=sheets, fit=fit, notes=(*design.notes, *left_out))
 
 
 def design_robot(
@@ -88,40 +173,38 @@ def design_robot(
         GeometryError: no link can carry a sheet, the wires buy none, or the folder is in use; nothing is written then.
     """
     options = options or DesignOptions()
+    check_target(Path(folder), replace)
+    meshes: dict[str, Mesh] = {}
     found: dict[str, LinkDesign] = {}
     reasons: list[str] = []
-    meshes: dict[str, Mesh] = {}
     for name in urdf_links(robot, packages, arguments):
         link = f"{robot}#{name}"
         try:
-            meshes[name] = next(load_link(link, None, packages, arguments)).mesh
-            design = design_link(
-                link, options=options, packages=packages, arguments=arguments, progress=progress, **search
-            )
+            source, fit = _fit_link(link, None, packages, progress, arguments, **(room_for(options) | search))
         except MeshError as error:
             reasons.append(f"{name}: {error}")
-        except GeometryError as error:
-            reasons.append(f"{name} carries none: {error}")
+            continue
+        meshes[name] = source.mesh
+        if fit.sheets:
+            found[name] = LinkDesign(name, (), fit, source.mesh, source.frame, source.notes)
         else:
-            found[name] = design
+            reasons.append(f"{name} carries none: {fit.reason}")
     joints = urdf_joints(robot, packages, arguments)
-    for name, design in list(found.items()):
-        progress(f"{name}: sweeping the joints beside it")
-        swept = _swept(name, joints, meshes)
-        kept = [_clear(sheet.fit, options.stack.thickness, swept) for sheet in design.sheets if sheet.fit is not None]
-        if any(one is not sheet.fit for one, sheet in zip(kept, design.sheets, strict=True)):
+    beside = {name: _swept_beside(name, joints, meshes) for name in found}
+    for name, design in found.items():
+        progress(f"{name}: placing sheets, tabs and cables beside what moves")
+        sheets = () if design.fit is None else design.fit.sheets
+        cleared = [_clear(sheet, options.stack.thickness, beside[name]) for sheet in sheets]
+        if any(one is not sheet for one, sheet in zip(cleared, sheets, strict=True)):
             reasons.append(f"{name}: its sheets end before what moves beside it")
-            sheets = _assembled(design, [one for one in kept if one is not None], options)
-            found[name] = dataclasses.replace(design, sheets=sheets)
-    sizes = [
-        (sheet.layout.active.area(sheet.layout.sheet), name, number)
-        for name, design in found.items()
-        for number, sheet in enumerate(design.sheets, 1)
-    ]
+        found[name] = _assembled(design, [one for one in cleared if one is not None], options, beside[name])
+        reasons += [f"{name}: {why}" for why in found[name].notes if why not in design.notes]
+    progress("looking at what can be touched")
+    sizes = _touchable(found, joints, meshes)
     offered: list[_Offer] = []
-    for area, name, number in sorted(sizes, key=lambda size: -size[0]):
+    for area, active, name, number in sorted(sizes, key=lambda size: -size[0]):
         total = area + (offered[-1].total if offered else 0.0)
-        offered.append(_Offer(name, number, area, _WIRES_PER_SHEET * (len(offered) + 1), total))
+        offered.append(_Offer(name, number, active, area, _WIRES_PER_SHEET * (len(offered) + 1), total))
     bought = len(offered) if wires is None else min(len(offered), wires // _WIRES_PER_SHEET)
     if not bought:
         raise GeometryError(
@@ -130,105 +213,125 @@ def design_robot(
         )
     with _new_folder(Path(folder), replace) as draft:
         result = RobotDesign(tuple(offered), bought, tuple(reasons))
-        links, sensors = [], 0
+        written, sensors = [], 0
         for name, design in found.items():
-            sheets = design.sheets
             wanted = {one.number for one in offered[:bought] if one.link == name}
             if not wanted:
                 continue
-            fits = [sheet.fit for number, sheet in enumerate(sheets, 1) if number in wanted and sheet.fit is not None]
-            chosen = sheets if len(wanted) == len(sheets) else _assembled(design, fits, options)
-            fits = [sheet.fit for sheet in chosen if sheet.fit is not None]
-            fit = None if design.fit is None else dataclasses.replace(design.fit, sheets=tuple(fits), bare_areas=())
-            write_design(
+            if len(wanted) < len(design.sheets):
+                places = [one.fit for k, one in enumerate(design.sheets, 1) if k in wanted and one.fit is not None]
+                design = _assembled(design, places, options, beside[name])
+            design.written(
                 draft / name,
-                chosen,
-                fit=fit,
-                mesh=design.mesh,
-                title=name,
-                source=f"{robot}#{name}",
-                frame=design.frame,
-                notes=design.notes,
+                f"{robot}#{name}",
                 options=files,
                 pictures=pictures,
                 progress=progress,
                 first_sensor=sensors,
             )
-            sensors += len(chosen)
-            links.append(name)
-        _write_robot(draft, result, links, str(robot), pictures)
+            sensors += len(design.sheets)
+            written.append(name)
+        _write_robot(draft, result, written, str(robot), pictures)
     return result
 
 
-def _assembled(design: LinkDesign, fits: Sequence[FittedSheet], options: DesignOptions) -> tuple[SheetDesign, ...]:
-    """Return the sheets of a link that has some of its places only, or shorter ones."""
-    if design.fit is None or not fits:
-        return ()
-    return design_assembly(
-        dataclasses.replace(design.fit, sheets=tuple(fits)), dataclasses.replace(options, link=design.name), design.mesh
-    )[0]
+def _clear(fit: FittedSheet, thickness: float, beside: Sequence[_SweptLink]) -> FittedSheet | None:
+    """Return a sheet that ends before what moves beside it; None where too little is left."""
+    from coneskin.geometry.fit.side import longest_run
 
-
-def _swept(link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh]) -> Any:
-    """Return points of the links next to one in its frame [m], shape (n, 3), over the ranges of the joints between."""
-    from coneskin.geometry.fit.surface_samples import sample_surface
-
-    clouds = [np.zeros((0, 3))]
-    for joint in joints:
-        other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
-        if other is None or other not in meshes:
-            continue
-        points = sample_surface(meshes[other], RayCaster(meshes[other])).points
-        steps = math.ceil((joint.upper - joint.lower) / _SWEEP_STEP)
-        for angle in np.linspace(joint.lower, joint.upper, steps + 1):
-            pose = joint.origin @ Pose.from_rotation_vector([float(angle) * x for x in joint.axis])
-            clouds.append((pose if link == joint.parent else pose.inverse()).apply_all(points))
-    return np.concatenate(clouds)
-
-
-def _clear(fit: FittedSheet | None, thickness: float, swept: Any) -> FittedSheet | None:
-    """Return a sheet that ends before what is swept; None where too little is left."""
-    if fit is None:
-        return None
     side = fit.placed.frustum
-    hit = swept[SheetBody(fit.placed, thickness).near(swept, _SWEEP_CLEARANCE)]
-    if not len(hit):
+    u = np.linspace(0.0, side.slant, max(2, math.ceil(side.slant / _SWEEP_ROW)) + 1)
+    points, normals = fit.placed.place(*np.meshgrid(u, np.linspace(0.0, side.wrap, 121), indexing="ij"))
+    met = np.zeros(len(u), bool)
+    for height in (0.0, 0.5 * thickness, thickness):
+        layer = (points + height * normals).reshape(-1, 3)
+        for body in beside:
+            met |= body.near(layer, _SWEEP_CLEARANCE).reshape(len(u), -1).any(axis=1)
+    if not met.any():
         return fit
-    u = np.clip(fit.placed.locate_all(hit)[0], 0.0, side.slant)
-    stops = np.unique(np.concatenate([[-_SWEEP_CLEARANCE], u, [side.slant + _SWEEP_CLEARANCE]]))
-    widest = int(np.diff(stops).argmax())
-    low, high = float(stops[widest]) + _SWEEP_CLEARANCE, float(stops[widest + 1]) - _SWEEP_CLEARANCE
-    if high - low < _LEAST_SLANT:
+    first, end = longest_run(~met)
+    if end == first or u[end - 1] - u[first] < _LEAST_SLANT:
         return None
-    part = fit.placed.part(low, high, 0.0, side.wrap)
+    part = fit.placed.part(float(u[first]), float(u[end - 1]), 0.0, side.wrap)
     share = part.frustum.area / side.area
     return dataclasses.replace(
         fit, placed=part, area_share=share * fit.area_share, length_share=share * fit.length_share
     )
 
 
+def _touchable(
+    links: Mapping[str, LinkDesign], joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh]
+) -> list[tuple[float, float, str, int]]:
+    """Return of each sheet what can be touched of its active area, that area [m2], its link and its number."""
+    from coneskin.geometry.fit.touch_weights import free_shares
+
+    chance = np.random.default_rng(1)
+    free: dict[tuple[str, int], list[float]] = {}
+    for _ in range(_POSE_COUNT):
+        poses = _poses(joints, [float(chance.uniform(joint.lower, joint.upper)) for joint in joints])
+        shown = [mesh.moved(poses.get(name, Pose())) for name, mesh in meshes.items()]
+        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in shown)])
+        faces = np.concatenate([mesh.faces + start for mesh, start in zip(shown, starts, strict=False)])
+        rays = RayCaster(Mesh(np.concatenate([mesh.vertices for mesh in shown]), faces))
+        for name, link in links.items():
+            for number, sheet in enumerate(link.sheets, 1):
+                box, pose = sheet.layout.active, poses.get(name, Pose())
+                grid = (
+                    np.linspace(low, high, count)
+                    for low, high, count in zip((box.u1, box.phi1), (box.u2, box.phi2), _TOUCH_GRID, strict=True)
+                )
+                points, normals = (part.reshape(-1, 3) for part in sheet.outer_face(*np.meshgrid(*grid, indexing="ij")))
+                turned = normals @ np.array(pose.rotation).T
+                share = float(free_shares(pose.apply_all(points), turned, rays).mean())
+                free.setdefault((name, number), []).append(share)
+    sizes = []
+    for (name, number), shares in free.items():
+        layout = links[name].sheets[number - 1].layout
+        active = layout.active.area(layout.sheet)
+        sizes.append((active * math.fsum(shares) / len(shares), active, name, number))
+    return sizes
+
+
+def _poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str, Pose]:
+    """Return the pose of each link in the frame of the root of a robot whose joints are at some angles [rad]."""
+    children = {joint.child for joint in joints}
+    poses = {joint.parent: Pose() for joint in joints if joint.parent not in children}
+    left = list(zip(joints, angles, strict=True))
+    while reached := [pair for pair in left if pair[0].parent in poses]:
+        for joint, angle in reached:
+            turn = Pose.from_rotation_vector([angle * x for x in joint.axis])
+            poses[joint.child] = poses[joint.parent] @ joint.origin @ turn
+        left = [pair for pair in left if pair[0].child not in poses]
+    return poses
+
+
 def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot: str, pictures: bool) -> None:
     """Write what holds for the robot: the curve as table and picture, the reasons, and the list of its files."""
-    rows = [("wires", "link", "sheet", "active area [cm2]", "with all before [cm2]", "bought")]
+    rows = [("wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "bought")]
     for count, one in enumerate(design.offered, 1):
-        areas = f"{1e4 * one.area:.1f}", f"{1e4 * one.total:.1f}"
+        areas = f"{1e4 * one.active:.1f}", f"{1e4 * one.area:.1f}", f"{1e4 * one.total:.1f}"
         rows.append((str(one.wires), one.link, str(one.number), *areas, "yes" if count <= design.bought else "no"))
     lines = [
         f"# Skin of {Path(robot).name}",
         "",
-        f"{design.bought} sheets, {_WIRES_PER_SHEET * design.bought} wires.",
+        f"{design.bought} sheets, {_WIRES_PER_SHEET * design.bought} wires. Touchable is the active area times the "
+        f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
     ]
-    lines += ["| " + " | ".join(row) + " |" for row in (rows[0], ("---",) * 6, *rows[1:])]
+    lines += ["| " + " | ".join(row) + " |" for row in (rows[0], ("---",) * 7, *rows[1:])]
     if pictures:
         from .pictures import draw_curve
 
         names = [f"{one.link} {one.number}" for one in design.offered]
         draw_curve(folder / "curve.png", [(one.wires, one.total) for one in design.offered], names, design.bought)
-        lines += ["", "![Active area against wires; what is bought is filled.](curve.png)"]
+        lines += ["", "![Touchable area against wires; what is bought is filled.](curve.png)"]
     lines += ["", *(f"* {reason}" for reason in design.reasons)]
     lines += [f"* [{name}]({name}/report.md): how its sheets are built" for name in links]
-    lines += ["* Not looked at: links two joints away, and what the skin of one link takes from another's range."]
+    lines += [
+        "* Sheets, tabs, ties and cables are clear of the links beside theirs, over the whole range of the joint "
+        "between. Not looked at: links two joints away, the thickness of another link's skin, and how a cable passes a "
+        "joint.",
+    ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     data = {"robot": robot, "links": list(links), "files": [*files, DESIGN_FILE]}
