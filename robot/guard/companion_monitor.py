@@ -155,7 +155,8 @@ class CompanionMonitor:
         elif ran:
             self._program = _DriverProgram(restarted_at=restarted_at)
             return "the driver's program has ended on the controller: its process may hang"
-        self._program = _DriverProgram(ran, end, restarted_at)
+        if ran is not self._program.ran or end != self._program.end:
+            self._program = _DriverProgram(ran, end, restarted_at)
         return ""
 
     def poll(self, now: float) -> list[tuple[str, frozenset[StopPath]]]:
@@ -184,10 +185,9 @@ class CompanionMonitor:
             if process == _USER_PROGRAM and not self._suspended:
                 continue
             since, what = self._held_up.get(process, (-math.inf, ""))
-            if now - since <= _LOOK_TIME:
-                limit = max(limit, HOLD_UP_LIMIT)
-            else:
-                what = _SILENT_WORDS[process == _USER_PROGRAM]
-            if now - heard > limit:
-                found[process] = f"{process}: {what.format(1e3 * limit)}"
+            waits = now - since <= _LOOK_TIME
+            allowed = max(limit, HOLD_UP_LIMIT) if waits else limit
+            if now - heard > allowed:
+                said = what if waits else _SILENT_WORDS[process == _USER_PROGRAM]
+                found[process] = f"{process}: {said.format(1e3 * allowed)}"
         return found

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from coneskin.robot.arm.model import ArmModel
@@ -31,24 +30,29 @@ _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its set
 _MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
 
 
-@dataclass(slots=True)
 class _ReducedSpeedTouch:
-    """One touch during which the arm is slow."""
+    """One touch during which the arm is slow. No dataclass: compiled, that would load the classes of its fields."""
 
-    #: largest speeds of the touched surface around it [m/s]: where its place was not certain, so that it was a bound,
-    #: and where it was
-    top: list[float]
-    before: float  # where the slider was
-    fraction: float  # where it is to be
-    deadline: float  # by when the arm must be slower [s]
-    end: float  # until when the touch may last [s]
-    slow: float  # speed of the surface below which the arm counts as slow [m/s]
-    approach: ContactApproach  # of the arm to what touches it
-    torque: OutsideTorque
-    resistance: ResistanceMonitor
-    held: str = ""  # why the arm counts as held by something
-    free_since: float | None = None
-    fast: int = 0  # samples in a row
+    def __init__(
+        self,
+        top: list[float],
+        slider: tuple[float, float],
+        times: tuple[float, float],
+        slow: float,
+        approach: ContactApproach,
+        torque: OutsideTorque,
+        resistance: ResistanceMonitor,
+    ) -> None:
+        #: largest speeds of the touched surface around it [m/s]: where its place was not certain, so that it was
+        #: a bound, and where it was
+        self.top = top
+        self.before, self.fraction = slider  # where the slider was, and where it is to be
+        self.deadline, self.end = times  # by when the arm must be slower, until when the touch may last [s]
+        self.slow = slow  # speed of the surface below which the arm counts as slow [m/s]
+        self.approach, self.torque, self.resistance = approach, torque, resistance
+        self.held = ""  # why the arm counts as held by something
+        self.free_since: float | None = None
+        self.fast = 0  # samples in a row
 
     def sample(self, time: float, speed: float, certain: bool = True) -> None:
         """Take the measured speed of the touched surface at a time [s, m/s]. ``certain`` where it is no bound."""
@@ -155,12 +159,11 @@ class SpeedReduction:
             top = list(last.top)
             if last.puts_back(before):  # else a person has moved it since
                 before = last.before
-        deadline, end = time + limits.stop_budget(state.speed, reaction.deceleration), time + reaction.time_budget
-        fraction = min(before, reaction.slow_to)
+        times = time + limits.stop_budget(state.speed, reaction.deceleration), time + reaction.time_budget
+        slider = before, min(before, reaction.slow_to)
         torque = self._torque_of(self._model)
         resistance = self._monitor_of(self._model, torque, True, self._tolerance)
-        slow = reaction.slow_speed
-        self.now = _ReducedSpeedTouch(top, before, fraction, deadline, end, slow, approach, torque, resistance)
+        self.now = _ReducedSpeedTouch(top, slider, times, reaction.slow_speed, approach, torque, resistance)
         out.append(SetSpeedSlider(self.now.fraction))
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
         return True

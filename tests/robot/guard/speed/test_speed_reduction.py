@@ -21,7 +21,7 @@ def slowing(speed=1.0, before=1.0, fraction=0.2):
     arm = arm_model("UR5e")
     torque = OutsideTorque(arm)
     approach = ContactApproach(arm, ZERO_VELOCITY, ZERO_VELOCITY, 10.0, 5e-4)
-    setting = [speed, speed], before, min(before, fraction), 10.2, 11.0, SLOW
+    setting = [speed, speed], (before, min(before, fraction)), (10.2, 11.0), SLOW
     return _ReducedSpeedTouch(*setting, approach, torque, ResistanceMonitor(arm, torque, True))
 
 
