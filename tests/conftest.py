@@ -32,7 +32,8 @@ _SHORT = "not long"  # the marker expression of the short run, as in pyproject.t
 
 # A slow machine is no failure, so nothing here depends on time; the same examples every time, so nothing on luck.
 _STEADY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow], "database": None}
-settings.register_profile("steady", derandomize=True, **_STEADY)
+# To search is the fuzz profile's, in the same CI run.
+settings.register_profile("steady", derandomize=True, max_examples=40, **_STEADY)
 settings.register_profile("fuzz", derandomize=False, max_examples=100, print_blob=True, **_STEADY)
 settings.load_profile("steady")  # --hypothesis-profile=fuzz takes its place: see scripts/fuzz
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from coneskin.cli import main
@@ -49,7 +49,6 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> list[list[Block]]:
 
 
 @pytest.mark.long
-@settings(max_examples=100)
 @given(seed=st.integers(0, 2**32))
 def test_no_mutated_recording_gives_a_traceback(bases: list[list[Block]], tmp_path_factory, seed: int) -> None:
     _replay_mutated(bases, tmp_path_factory.getbasetemp() / "mutated.rec", seed)
