@@ -5,6 +5,10 @@
 A stop of category 0 from full speed, arm stretched out, highest payload, shoulder and elbow on their way down: user
 manuals UR5/CB3 3.4.5 and UR3/CB3 3.10, appendix A. The e-Series manuals have curves without numbers, and no table of
 the UR10 was found: for these arms the simulation stands alone.
+
+The second table needs no law of braking. What turns loses its energy on the published way, and its momentum in the
+published time: so much torque the joint gives on average, with gravity against it. A joint that gives more than its
+highest torque is not braked by its motor alone, or carries less than the table says.
 """
 
 from __future__ import annotations
@@ -13,10 +17,11 @@ import argparse
 import math
 
 from bench.report import head, show
+from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded, mass_matrix
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.sim.motion.arm import CYCLE, SimulatedArm
 
-from .deceleration import JOINT_NAMES, PAYLOAD_MASSES, STOP_SPEED, STRETCHED_JOINTS
+from .deceleration import JOINT_NAMES, PAYLOAD_MASSES, STOP_SPEED, STRETCHED_JOINTS, ZERO_JOINTS
 
 #: arm -> distance [rad] and time [s] of base, shoulder, elbow
 PUBLISHED_STOPS = {
@@ -42,6 +47,15 @@ def stop(name: str, joint: int, speed: float, payload: float) -> tuple[float, fl
     return max(found)
 
 
+def needed(name: str, joint: int, way: float, time: float, payload: float) -> tuple[float, float]:
+    """Return the mean torque of a stop [N m] that takes this way [rad], and of one that takes this time [s]."""
+    model, inertia = arm_model(name), loaded(arm_inertia(name), payload, (0.0, 0.0, 0.0))
+    turned = mass_matrix(model, inertia, STRETCHED_JOINTS)[joint][joint]
+    weight = abs(joint_torques(model, inertia, STRETCHED_JOINTS, ZERO_JOINTS, ZERO_JOINTS)[joint])
+    on_way = 0.5 * turned * STOP_SPEED**2 / way + weight * math.sin(way) / way
+    return on_way, turned * STOP_SPEED / time + weight * math.cos(way)
+
+
 def main() -> None:
     """Measure, and print both tables."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
@@ -55,6 +69,15 @@ def main() -> None:
             rows.append([f"{name}, {JOINT_NAMES[joint]}", *cells])
     columns = ["arm, joint", "published rad", "simulated rad", "", "published ms", "simulated ms", ""]
     show("category 0, full speed, payload and extension", columns, rows)
+    rows = []
+    for name, published in PUBLISHED_STOPS.items():
+        for joint, (way, time) in enumerate(published):
+            highest = arm_inertia(name).torque[joint]
+            full, bare = (needed(name, joint, way, time, payload) for payload in (PAYLOAD_MASSES[name], 0.0))
+            cells = [f"{highest:.0f}", *(f"{value:.0f}, {value / highest:.0%}" for value in (*full, *bare))]
+            rows.append([f"{name}, {JOINT_NAMES[joint]}", *cells])
+    columns = ["arm, joint", "highest", "by the way", "by the time", "by the way, bare", "by the time, bare"]
+    show("mean torque that the published stop takes [N m], of the highest", columns, rows)
     rows = []
     for name, payload in PAYLOAD_MASSES.items():
         for joint in range(3):
