@@ -6,9 +6,9 @@ A stop of category 0 from full speed, arm stretched out, highest payload, should
 manuals UR5/CB3 3.4.5 and UR3/CB3 3.10, appendix A. The e-Series manuals have curves without numbers, and no table of
 the UR10 was found: for these arms the simulation stands alone.
 
-The second table needs no law of braking. What turns loses its energy on the published way, and its momentum in the
-published time: so much torque the joint gives on average, with gravity against it. A joint that gives more than its
-highest torque is not braked by its motor alone, or carries less than the table says.
+The last two columns need no law of braking. What turns loses its energy on the published way, and its momentum in the
+published time: so much of its highest torque the joint gives on average, with gravity against it. A joint that gives
+more than that is not braked by its motor alone, or carries less than the table says.
 """
 
 from __future__ import annotations
@@ -66,17 +66,21 @@ def main() -> None:
             got_way, got_time = stop(name, joint, STOP_SPEED, PAYLOAD_MASSES[name])
             cells = [f"{way:.2f}", f"{got_way:.2f}", f"{got_way / way - 1.0:+.0%}"]
             cells += [f"{1e3 * time:.0f}", f"{1e3 * got_time:.0f}", f"{got_time / time - 1.0:+.0%}"]
+            torques, highest = needed(name, joint, way, time, PAYLOAD_MASSES[name]), arm_inertia(name).torque[joint]
+            cells += [f"{torque / highest:.0%}" for torque in torques]
             rows.append([f"{name}, {JOINT_NAMES[joint]}", *cells])
-    columns = ["arm, joint", "published rad", "simulated rad", "", "published ms", "simulated ms", ""]
+    columns = [
+        "arm, joint",
+        "published rad",
+        "simulated rad",
+        "",
+        "published ms",
+        "simulated ms",
+        "",
+        "torque/way",
+        "torque/time",
+    ]
     show("category 0, full speed, payload and extension", columns, rows)
-    rows = []
-    for name, published in PUBLISHED_STOPS.items():
-        for joint, (way, time) in enumerate(published):
-            highest = arm_inertia(name).torque[joint]
-            by_way, by_time = needed(name, joint, way, time, PAYLOAD_MASSES[name])
-            cells = [f"{value / highest:.0%}" for value in (by_way, by_time)]
-            rows.append([f"{name}, {JOINT_NAMES[joint]}", f"{highest:.0f}", *cells])
-    show("mean torque that the published stop takes", ["arm, joint", "highest N m", "by way", "by time"], rows)
     rows = []
     for name, payload in PAYLOAD_MASSES.items():
         for joint in range(3):
