@@ -30,6 +30,7 @@ _USUAL_SILENCE_MS = 50  # what a scene allows by default
 _SPI_PINS = {"10": "CS", "11": "MOSI", "12": "MISO", "13": "SCK"}  # of an Uno or Nano
 _FIXED_VOLTS = 2.5  # of the cheap regulator
 _LEAST_CHIP_SHUNT = 10.0  # ohm; below, a shunt is a part of its own
+_LIST_COLUMNS = "count,names,what,value,number,second source,EUR,data sheet,limits not sourced"  # of the list of parts
 WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
     *(("E_A", "white"), ("S_A", "brown"), ("E_B", "green"), ("S_B", "yellow"), ("E_C", "grey"), ("S_C", "pink")),
     *(("E_D", "blue"), ("S_D", "red"), ("GND", "black, violet"), ("SHIELD", "braid, here only")),
@@ -102,18 +103,7 @@ class BoardCircuit(NamedTuple):
         for component in [*self.components, Component("W1", "cable", "", "", {})]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
-        columns = (
-            "count",
-            "names",
-            "what",
-            "value",
-            "number",
-            "second source",
-            "EUR",
-            "data sheet",
-            "limits not sourced",
-        )
-        rows.writerow(columns)
+        rows.writerow(_LIST_COLUMNS.split(","))
         own = _unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
         rows.writerow((1, "A1", self.facts.title, *[""] * 5, own))
         for (part, value), names in alike.items():
@@ -133,14 +123,13 @@ class BoardCircuit(NamedTuple):
             found.append(f'    (comp (ref "{name}") (value "{value or row["number"]}"){place})')
             numbers = row.get("pins", {})
             for pin, net in pins.items():
-                nodes = (f'(node (ref "{name}") (pin "{number}"))' for number in numbers.get(pin, pin).split())
-                nets.setdefault(net, []).extend(nodes)
+                ends = (f'(node (ref "{name}") (pin "{number}"))' for number in numbers.get(pin, pin).split())
+                nets.setdefault(net, []).extend(ends)
         for pin, net in self.pins.items():
             nets.setdefault(net, []).append(f'(node (ref "A1") (pin "{pin}"))')
         found = [f'    (comp (ref "A1") (value "{self.facts.title}"))', *found]
-        listed = [
-            f'    (net (code "{n}") (name "{net}") {" ".join(at)})' for n, (net, at) in enumerate(nets.items(), 1)
-        ]
+        at = enumerate(nets.items(), 1)
+        listed = [f'    (net (code "{n}") (name "{net}") {" ".join(nodes)})' for n, (net, nodes) in at]
         return "\n".join(['(export (version "E")', "  (components", *found, "  )", "  (nets", *listed, "  ))", ""])
 
     @property
@@ -231,10 +220,8 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
                 f"{facts.logic_volts:g} V: take another board, or another converter"
             )
         *electrodes, current, rail = other.channels
-        down = other.pull_down or board.pull_down
-        board = board._replace(
-            sense=tuple(electrodes), current=current, supply=rail, select=(), common="", pull_down=down
-        )
+        board = board._replace(sense=tuple(electrodes), current=current, supply=rail, select=(), common="")
+        board = board._replace(pull_down=other.pull_down or board.pull_down)
         bits, volts = other.bits + other.extra_bits, other.volts
     ampere = 1.0 / (SENSE_GAIN * shunt)  # A for a volt
     lead, resistor = _WIRE_OHMS + limits["on_ohm"][0], sensor.electronics.pulldown_ohms
@@ -291,32 +278,36 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     def two(letter: str, kind: str, value: str, one: str, other: str) -> Component:
         return part(letter, kind, value, _1=one, _2=other)
 
-    yield two("C", "decoupling", "10 uF", "5V", "GND")
+    def filtered(net: str, value: str, kind: str = "decoupling") -> Component:
+        return two("C", kind, value, net, "GND")
+
+    yield filtered("5V", "10 uF")
     if parts.supply_volts == _FIXED_VOLTS:
         yield part("U", "regulator", IN="5V", OUT="REG", GND="GND")
     else:
         unused = {"ILIM": "GND", "PGFB": "5V"}  # no limit of the current, no quick start
         yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND", **unused)
         yield two("R", "precise", _ohms_text(1e4 * parts.supply_volts), "SET", "GND")
-        yield two("C", "decoupling", "4.7 uF", "SET", "GND")
-    yield two("C", "decoupling", "10 uF", "REG", "GND")
+        yield filtered("SET", "4.7 uF")
+    yield filtered("REG", "10 uF")
     yield two("R", "precise" if shunt >= _LEAST_CHIP_SHUNT else "low_shunt", f"{shunt:.3g} ohm", "REG", "RAIL")
     amplifier = {"IN+": "REG", "IN-": "RAIL", "REF": "BIAS", "OUT": "AMP", "VS": "3V3", "GND": "GND"}
     yield part("U", "amplifier", **amplifier)
-    yield two("C", "decoupling", "100 nF", "3V3", "GND")
+    yield filtered("3V3", "100 nF")
     yield two("R", "precise", "10 kohm", "3V3", "BIAS")
     yield two("R", "precise", "127 ohm", "BIAS", "GND")
-    yield two("C", "decoupling", "1 uF", "BIAS", "GND")
+    yield filtered("BIAS", "1 uF")
     for net, to in (("AMP", "ADC_I"), ("RAIL", "ADC_S")):
         yield two("R", "resistor", "1 kohm", net, to)
-        yield two("C", "filter", "470 pF", to, "GND")
+        yield filtered(to, "470 pF", "filter")
     group = "switches"
     switch = switch_for(circuit.sensor)[0]
+    supply = "3V3" if switch == "low_switch" else "5V"
     for common, gate in (("RAIL", "HIGH_"), ("GND", "LOW_")):
         channels = {f"S{k}": common for k in (1, 2, 3, 4)} | {f"D{k}": f"DRIVE_{e}" for k, e in enumerate("ABCD", 1)}
         gates = {f"SEL{k}": gate + e for k, e in enumerate("ABCD", 1)}
-        yield part("U", switch, **channels, **gates, VDD="3V3" if switch == "low_switch" else "5V", GND="GND")
-        yield two("C", "decoupling", "100 nF", "3V3" if switch == "low_switch" else "5V", "GND")
+        yield part("U", switch, **channels, **gates, VDD=supply, GND="GND")
+        yield filtered(supply, "100 nF")
         for e in "ABCD":
             yield two("R", "resistor", "100 kohm", gate + e, "GND")
     group = "clamps"
@@ -325,10 +316,10 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     for e in "ABCD":
         group = f"electrode {e}"
         yield two("FB", "bead", "", f"DRIVE_{e}", f"E_{e}")
-        yield two("C", "filter", "220 pF", f"E_{e}", "GND")
+        yield filtered(f"E_{e}", "220 pF", "filter")
         yield two("R", "precise", _ohms_text(parts.input_ohms), f"S_{e}", "GND")
         yield two("R", "resistor", "1 kohm", f"S_{e}", f"ADC_{e}")
-        yield two("C", "filter", "470 pF", f"ADC_{e}", "GND")
+        yield filtered(f"ADC_{e}", "470 pF", "filter")
         if e in "CD":
             yield two("R", "precise", _ohms_text(circuit.pulldown_ohms), f"DRIVE_{e}", f"DOWN_{e}")
     group = "converter"
@@ -338,13 +329,13 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         lines = {"SDI": "MOSI", "SDO": "MISO", "SCK": "SCK", "CS/CONV": "CS", "VREF": "VREF", "REFCOMP": "REFCOMP"}
         yield part("U", converter.name, **channels, **lines, VDD="5V", GND="GND")
         for net, value in (("5V", "100 nF"), ("VREF", "2.2 uF"), ("REFCOMP", "10 uF")):
-            yield two("C", "decoupling", value, net, "GND")
+            yield filtered(net, value)
     elif converter is not None:
         supply = "5V" if circuit.facts.logic_volts > 3.3 else "3V3"
         for address, nets in (("GND", inputs[:4]), (supply, inputs[4:])):
             channels = {f"AIN{k}": net for k, net in enumerate(nets)}
             yield part("U", converter.name, **channels, ADDR=address, SDA="SDA", SCL="SCL", VDD=supply, GND="GND")
-            yield two("C", "decoupling", "100 nF", supply, "GND")
+            yield filtered(supply, "100 nF")
         for net in ("SDA", "SCL"):
             yield two("R", "resistor", "2.2 kohm", supply, net)
     elif circuit.board.common:
@@ -352,7 +343,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         channels = {f"S{int(n) + 1}": net for n, net in zip(numbers, inputs, strict=True)}
         lines = {f"A{k}": f"MUX_{k}" for k in (0, 1, 2)}
         yield part("U", "multiplexer", **channels, **lines, D="MUX", EN="3V3", VDD="3V3", VSS="GND", GND="GND")
-        yield two("C", "decoupling", "100 nF", "3V3", "GND")
+        yield filtered("3V3", "100 nF")
     group = "connector and test points"
     yield part("J", "connector", **{f"_{k}": net for k, (net, _) in enumerate(WIRES, 1)})
     yield two("R", "resistor", "0 ohm", "SHIELD", "GND")

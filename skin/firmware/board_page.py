@@ -101,6 +101,7 @@ _COLUMN_GROUPS = (  # x, and what stands there from top to bottom
     (1370, ("electrode D", "connector and test points")),
 )
 _NET_COLOURS = {"GND": "#555", "SHIELD": "#555", "5V": "#b02a1a", "3V3": "#b02a1a", "REG": "#b02a1a", "RAIL": "#b02a1a"}
+_PAIR_WORDS = "E drives an electrode, S reads it: two wires, a twisted pair."
 _SVG_STYLE = (
     "text{font:11px sans-serif;fill:#222}.title{font-size:18px;font-weight:bold}.group{font-size:14px;font-weight:bold}"
     "path,rect{fill:none;stroke:#222;stroke-width:1.2}rect{fill:#eef3f6}.name{font-weight:bold}"
@@ -133,9 +134,7 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
         f"<style>{_SVG_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{lowest + 10}" style="fill:#fff;stroke:none"/>',
         _text(20, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
-        _text(
-            20, 58, "Pins with the same word are joined. E drives an electrode, S reads it: two wires, a twisted pair."
-        ),
+        _text(20, 58, f"Pins with the same word are joined. {_PAIR_WORDS}"),
     ]
     return "\n".join([*head, *out, "</svg>", ""])
 

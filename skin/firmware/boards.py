@@ -78,9 +78,7 @@ class Converter(NamedTuple):
     extra_bits: int  #: that the sketch's usual setting adds
     rate_hz: int  #: frames per second of the usual setting
     permille: int  #: of the range that the sketch takes for the rail
-    pull_down: tuple[
-        str, ...
-    ]  #: pins in place of the board's, by a converter on SPI, which answers with 5 V; else none
+    pull_down: tuple[str, ...]  #: in place of the board's, by a converter on SPI, which answers with 5 V; else none
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -126,9 +124,8 @@ def _board(row: str) -> Board:
     words = [listed or quoted or word for quoted, listed, word in _WORD_PATTERN.findall(row)]
     name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = words
     gates = _pins(rail), _pins(ground), _pins(pull_down)
-    return Board(
-        name, int(bits), int(baud), _pins(sense), current, supply, *gates, _pins(select), "".join(_pins(common))
-    )
+    common = "".join(_pins(common))
+    return Board(name, int(bits), int(baud), _pins(sense), current, supply, *gates, _pins(select), common)
 
 
 def _pins(listed: str) -> tuple[str, ...]:

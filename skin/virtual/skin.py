@@ -94,14 +94,11 @@ class VirtualSkin:
             raise SensorError(f"rate_hz must be finite and above 0 Hz, at most {_MAX_RATE:g} Hz, got {rate_hz!r} Hz")
         if not duration > 0.0:
             raise SensorError(f"duration must be above 0 s, got {duration!r} s")
-        self.rate_hz = rate_hz
-        self.seed = seed
+        self.rate_hz, self.seed, self.duration, self.frame_length = rate_hz, seed, duration, frame_length
         self.imperfections = imperfections or Imperfections()
         self.faults = faults or FaultInjection()
         sheets = contact_model(model) if isinstance(model, str) else model
         self.model = sheets if wires == RIGHT_WIRES else RewiredSheets(sheets, wires)
-        self.duration = duration
-        self.frame_length = frame_length
         self._channels = _channels(frame_length)
         stuck = self.faults.stuck_channel
         one_supply = frame_length == FRAME_LENGTH

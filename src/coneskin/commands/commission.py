@@ -70,9 +70,7 @@ def run(args: argparse.Namespace) -> int:
         print('and hold it until it is read. "n" and Enter: out of reach, name another. Ctrl-C ends it.', flush=True)
     record = commissioner.run(args.by, begin)
     path = write_record(scene, record)
-    if args.json:
-        print(json.dumps({"kind": "end", "passed": record.passed, "cause": record.cause, "record": str(path)}))
-    else:
-        said = "passed: the arm may move away from touches" if record.passed else "NOT passed: the arm only stops"
-        print(f"{terminal.clear()}{said}; written to {path}")
+    facts = {"kind": "end", "passed": record.passed, "cause": record.cause, "record": str(path)}
+    said = "passed: the arm may move away from touches" if record.passed else "NOT passed: the arm only stops"
+    print(json.dumps(facts) if args.json else f"{terminal.clear()}{said}; written to {path}")
     return 0 if record.passed else 1

@@ -263,8 +263,7 @@ class _Transcript:
     """Lines of the guard, which come from a thread of their own, and of the program, in the order of their times."""
 
     def __init__(self, say: Callable[[str], None], began: Callable[[], float]) -> None:
-        self._say = say
-        self._began = began
+        self._say, self._began = say, began
         self._seen: set[str] = set()
         self._changed = threading.Condition()
 

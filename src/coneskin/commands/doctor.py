@@ -64,11 +64,9 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.commissioning.examination.examination import Doctor
 
     def tell(finding: Finding) -> None:
-        if args.json:
-            print(json.dumps(asdict(finding)), flush=True)
-        else:
-            verdict = painted(finding.verdict, _VERDICT_COLORS[finding.verdict], sys.stdout)
-            print(finding.text.replace(finding.verdict, verdict, 1), flush=True)
+        verdict = painted(finding.verdict, _VERDICT_COLORS[finding.verdict], sys.stdout)
+        said = finding.text.replace(finding.verdict, verdict, 1)
+        print(json.dumps(asdict(finding)) if args.json else said, flush=True)
 
     def ask(words: str) -> None:
         print(f"       >>  {words}", file=sys.stderr, flush=True)

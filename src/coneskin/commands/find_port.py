@@ -44,10 +44,8 @@ def run(args: argparse.Namespace) -> int:
     say = partial(print_line, file=sys.stderr)
     port = _await_port(find_ports, say, args.timeout_s)
     trouble, name = _port_trouble(port.device), _stable_name(port.device)
-    if args.json:
-        print(json.dumps({"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}))
-    else:
-        print(name)
+    facts = {"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}
+    print(json.dumps(facts) if args.json else name)
     if trouble:
         say(trouble)
     return 1 if trouble else 0
@@ -57,11 +55,8 @@ def _list(ports: Sequence[PortFacts], as_json: bool) -> int:
     """List the ports with what stands against their use; return 0 where one can be used."""
     rows = [(port, _port_trouble(port.device)) for port in ports]
     for port, trouble in rows:
-        if as_json:
-            facts = {"device": port.device, "description": port.description, "hardware": port.hardware}
-            print(json.dumps({**facts, "trouble": trouble}))
-        else:
-            print(f"{port}{f'  {trouble}' if trouble else ''}")
+        facts = {"device": port.device, "description": port.description, "hardware": port.hardware, "trouble": trouble}
+        print(json.dumps(facts) if as_json else f"{port}  {trouble}".rstrip())
     if not rows:
         print("no serial port is there", file=sys.stderr)
     return 0 if any(not trouble for _, trouble in rows) else 1

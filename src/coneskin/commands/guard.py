@@ -87,10 +87,8 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
             publisher.publish(event, session.began)
         if event.name == EventName.GUARD_EXITED:
             return  # the error that ends this program contains it
-        if args.json:
-            print_line(json.dumps({"t": event.time - session.began, "name": event.name, **event.details}))
-        else:
-            print_line(lines.describe(event, session.began))
+        facts = {"t": event.time - session.began, "name": event.name, **event.details}
+        print_line(json.dumps(facts) if args.json else lines.describe(event, session.began))
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C: the arm is stopped, the recording closed
     start_timeout = _START_TIMEOUT if args.duration_s is None else min(_START_TIMEOUT, args.duration_s)
@@ -125,11 +123,8 @@ class _Work:
     """Work of the command while it guards, in an entered session and for a time [s]; ``code`` is that of its errors."""
 
     def __init__(self, session: Session, duration: float, once: bool) -> None:
-        self.code = 0
-        self._session = session
-        self._duration = duration
-        self._once = once
-        self._end = math.inf
+        self.code, self._end = 0, math.inf
+        self._session, self._duration, self._once = session, duration, once
 
     def run(self) -> None:
         """Guard until the end."""

@@ -94,18 +94,10 @@ def _replay_one(args: argparse.Namespace) -> int:
         draw_run(recorded, args.picture)
     start = recorded.start
     if args.json:
-        facts = {
-            "same": result.same,
-            "verdict": result.verdict,
-            "compared": result.compared,
-            "duration_s": result.duration,
-            "skin_bytes": result.frames,
-            "missing": result.missing or None,
-            "other_code": result.other_code,
-            "differences": result.differences,
-            "events": event_facts(result.events, start),
-        }
-        print(json.dumps(facts))
+        facts = {"same": result.same, "verdict": result.verdict, "compared": result.compared}
+        facts |= {"duration_s": result.duration, "skin_bytes": result.frames, "missing": result.missing or None}
+        facts |= {"other_code": result.other_code, "differences": result.differences}
+        print(json.dumps({**facts, "events": event_facts(result.events, start)}))
     else:
         _report(result, start, args.events)
     if args.allow_incomplete and result.verdict == "incomplete":

@@ -250,10 +250,8 @@ def _diff(args: argparse.Namespace) -> int:
         if not args.json:
             print("one of them is a cut: what a start in the middle changes does not count (0.5 mm, 1.1 deg, 5 ms)")
     comparison = compare_decisions(one, other, tolerances)
-    if args.json:
-        print(json.dumps(comparison_facts(comparison)))
-    else:
-        print(printable("\n".join(comparison_lines(comparison))))
+    said = json.dumps(comparison_facts(comparison)) if args.json else "\n".join(comparison_lines(comparison))
+    print(printable(said))
     return 0 if comparison.same else 1
 
 
@@ -283,12 +281,10 @@ def _export(args: argparse.Namespace) -> int:
     from coneskin.runs.export.export import export_run
 
     written = export_run(_read(args.run), args.output, args.format, ProgressBar("the frames"))
-    if args.json:
-        print(json.dumps({"files": [{"path": str(path), "rows": rows} for path, rows in written.items()]}))
-    else:
-        for path, rows in written.items():
-            kind = args.format or path.suffix[1:]
-            print(f"{path}: {rows} {'messages' if kind == 'mcap' else 'rows'}")
+    facts = {"files": [{"path": str(path), "rows": rows} for path, rows in written.items()]}
+    kinds = {path: "messages" if (args.format or path.suffix[1:]) == "mcap" else "rows" for path in written}
+    lines = (f"{path}: {rows} {kinds[path]}" for path, rows in written.items())
+    print(json.dumps(facts) if args.json else "\n".join(lines))
     return 0
 
 

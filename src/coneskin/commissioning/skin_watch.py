@@ -202,8 +202,7 @@ class TouchSession:
         wired_as: Scene | None = None,
     ) -> None:
         check_touchable(scene, simulated)
-        self.scene = scene
-        self.simulated = simulated
+        self.scene, self.simulated = scene, simulated
         self._notice, self._reading, self._refused = notice, reading, refused
         self._wired_as = wired_as or scene
         self._client: SkinClient | None = None

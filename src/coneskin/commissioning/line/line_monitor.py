@@ -87,10 +87,8 @@ class LineMonitor:
     def __init__(
         self, start: float, sensors: Sequence[Sensor] = (), baud: int | None = None, timed: bool = True
     ) -> None:
-        self._start = start
+        self._start, self._baud, self._timed = start, baud, timed
         self._sensors = tuple(sensors)
-        self._baud = baud
-        self._timed = timed
         self._window = CaptureWindow(start)
         self._decoder = FrameDecoder()
         self._stream = TouchStream(self._sensors) if self._sensors else None
