@@ -9,6 +9,7 @@ import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import resolve_name
 from pathlib import Path
 
 import pytest
@@ -293,6 +294,41 @@ def test_a_heavy_dependency_is_imported_inside_the_function_that_needs_it(packag
 def test_the_live_path_knows_no_arrays(name: str) -> None:
     found = {imported.split(".")[0] for imported, _, _ in imports(ROOT / name)}
     assert not found & {"numpy", "scipy", "trimesh", "matplotlib"}
+
+
+def test_no_compiled_class_of_values_has_a_field_of_a_class_that_is_not_loaded() -> None:
+    """Compiled, it looks for the classes of its fields as it is made: where one is not loaded the process dies.
+
+    An optional one, or one in a tuple, is not looked for.
+    """
+    setup = (ROOT / "setup.py").read_text(encoding="utf-8").partition("packages, package_dir")[0]
+    build = {"__file__": "setup.py"}
+    exec(setup, build)
+    patterns = [pattern for group in build["COMPILED"].values() for pattern in group]
+    paths = [path for pattern in patterns for path in (ROOT / "src" / "coneskin").glob(f"{pattern}.py")]
+    found = []
+    for path in (path for path in paths if path.stem not in build["PURE"]):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        package = ".".join(("coneskin", *path.relative_to(ROOT / "src" / "coneskin").parent.parts))
+        late = {
+            name.asname or name.name: resolve_name("." * node.level + (node.module or ""), package)
+            for block in tree.body
+            if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+            for node in ast.walk(block)
+            if isinstance(node, ast.ImportFrom)
+            for name in node.names
+        }
+        for each in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+            said = [ast.unparse(what) for what in (*each.decorator_list, *each.bases)]
+            fields = [item for item in each.body if isinstance(item, ast.AnnAssign)]
+            if any(word.startswith("dataclass") or word == "NamedTuple" for word in said):
+                names = [ast.unparse(item.annotation) for item in fields]
+                found += [
+                    f"{path.stem}.{each.name}: {name}"
+                    for name in names
+                    if name in late and isinstance(getattr(importlib.import_module(late[name]), name), type)
+                ]
+    assert not found
 
 
 def test_tests_import_nothing_of_the_benches_and_these_only_the_support_of_tests() -> None:
