@@ -132,15 +132,11 @@ def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLi
         of_sensor = [patch for patch in limit.patches if patch.sensor == name]
         for u in {patch.u for patch in of_sensor}:
             normals = [at.place(u, phi)[1] for phi in sorted(patch.phi for patch in of_sensor if patch.u == u)]
-            widest = max([widest, *(_angle(a, b) for a, b in pairwise((*normals, *normals[: 1 if closed else 0])))])
+            for a, b in pairwise((*normals, *normals[: 1 if closed else 0])):
+                widest = max(widest, 2.0 * math.asin(min(1.0, 0.5 * math.dist(a, b))))
     between = 1.0 / max(0.1, math.cos(0.5 * widest))
     speeds = PermissibleSpeeds(limit.levers, tuple(patches), limit.lowest, limit.highest, between)
     return SpeedLimit(arm, speeds)
-
-
-def _angle(a: Vector, b: Vector) -> float:
-    """Return the angle between two unit vectors [rad]."""
-    return 2.0 * math.asin(min(1.0, 0.5 * math.dist(a, b)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,17 +183,9 @@ def _force_table(values: Mapping[str, Any]) -> ForceTable | None:
 def _thresholds(table: Mapping[str, Any], values: Mapping[str, Any], forces: ForceTable | None) -> Thresholds:
     from coneskin.skin.electronics import Thresholds
 
-    touch, location = _touch_level(table, values, forces), values["location_level"]
-    if values["touch_force"] is not None and "location_level" not in table:
-        location = max(location, touch)
-    return Thresholds(touch, values["release_level"], location)
-
-
-def _touch_level(table: Mapping[str, Any], values: Mapping[str, Any], forces: ForceTable | None) -> float:
-    """Return the level of the touch threshold, which may be given as a force."""
-    force = values["touch_force"]
+    force, location = values["touch_force"], values["location_level"]
     if force is None:
-        return float(values["touch_level"])
+        return Thresholds(float(values["touch_level"]), values["release_level"], location)
     if "touch_level" in table:
         raise SensorError("touch_force_n and touch_level are two thresholds of one touch: leave one out")
     if forces is None:
@@ -201,7 +193,8 @@ def _touch_level(table: Mapping[str, Any], values: Mapping[str, Any], forces: Fo
             f"touch_force_n = {force:g} needs a calibration with known forces: "
             "coneskin calibrate SCENE --forces 1,2,5,10, and calibration in this table"
         )
-    return forces.level(force)
+    touch = forces.level(force)
+    return Thresholds(touch, values["release_level"], location if "location_level" in table else max(location, touch))
 
 
 def read_toml(path: Path, limit: int, where: str, problems: list[str]) -> dict[str, Any]:
