@@ -111,7 +111,7 @@ def decode(sitting: Sitting) -> dict[str, np.ndarray]:
             out["seconds"][k, n] = clock() - began
             for event in events:
                 if isinstance(event, SkinFault):
-                    out["faults"][k], out["named"][k] = True, event.fault.name
+                    out["faults"][k], out["named"][k] = True, f"{event.fault.name}: {event.detail}"
             reading = detector.reading_now
             if reading is None:
                 continue

@@ -5,7 +5,7 @@
 
 Each row draws skins whose flaws have the size of the row as their standard deviation; the decoder is told that size, or
 "film" where it has no such number. Sheets: `skin/virtual/built_sheets`. The circuit is a nodal analysis of its own, and
-the frames go as bytes into a stream. Four contacts a skin, 40 frames each, from the third on.
+the frames go as bytes into a stream. Four contacts a skin, 40 frames each, from the third on, then 100 without.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ FIRST_FRAME = 2  # from which on a place is judged
 ELLIPSE_CHI2 = 5.991
 GUIDES = (0, 1, 3, 4, 6, 7)  # of the ten counts
 CURRENTS = (2, 5, 8)
+TAIL_COUNT = 100  # frames after a touch, in which a change of the untouched currents shows
 Frames = np.ndarray
+_ONE_SHEET = "CURRENT_CHANGED: the upper sheet"
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,11 @@ class Row:
         peeled: part of one electrode.
         speed: at which the contact slides [m/s].
         warmed: standard deviation by which the upper and the lower sheet change after learning, a ratio.
+        stepped: least and most by which the upper sheet changes after learning, up or down, a ratio.
         damp: conductance between the layers after learning [S].
         change: of the exact counts, shape (..., frames, 10); told a random source.
+        late: the sheets' flaws come after learning.
+        right: words of the name that it should have.
     """
 
     name: str
@@ -63,8 +68,11 @@ class Row:
     peeled: float = 0.0
     speed: float = 0.0
     warmed: tuple[float, float] = (0.0, 0.0)
+    stepped: tuple[float, float] = (0.0, 0.0)
     damp: float = 0.0
     change: Callable[[Frames, random.Random, ConverterPlant], Frames] | None = None
+    late: bool = False
+    right: str = ""
 
 
 def _mains(volts: float) -> Callable[[Frames, random.Random, ConverterPlant], Frames]:
@@ -109,7 +117,18 @@ ROWS = (
         Row(f"both sheets {100 * v:g} % after learning", told=SheetTolerance(drift=v), warmed=(v, v))
         for v in (0.005, 0.02)
     ),
-    Row("one sheet 1 % after learning", told=FILM_SHEETS, warmed=(0.01, 0.0)),
+    Row("one sheet 1 % after learning", told=FILM_SHEETS, warmed=(0.01, 0.0), right=_ONE_SHEET),
+    Row("one sheet 1.2 to 4 % after learning", told=FILM_SHEETS, stepped=(0.012, 0.04), right=_ONE_SHEET),
+    *(
+        Row(
+            f"{100 * part:g} % of an electrode peels after learning",
+            FILM_SHEETS,
+            peeled=part,
+            late=True,
+            right=_ONE_SHEET,
+        )
+        for part in (0.2, 0.4)
+    ),
     Row("damp, 20 uS after learning", told=FILM_SHEETS, damp=2e-5),
     Row("20 mV of mains on the guides", told=IDEAL_SHEETS, change=_mains(0.02)),
     Row("current gain 2 %", told=FILM_SHEETS, change=_gain(0.02)),
@@ -128,6 +147,7 @@ def measure(row: Row, skins: int) -> list[str]:
     plant, base = SHEETS[NAME], electronics(NAME)[ELECTRIC]
     exact_field = FieldContacts()
     errors, inside, certain, names = [], [], [], Counter[str]()
+    moment = np.arange(FRAME_COUNT + TAIL_COUNT)
     for seed in range(skins):
         rng = random.Random(f"{row.name} {seed}")
         noise = np.random.default_rng(seed)
@@ -141,8 +161,9 @@ def measure(row: Row, skins: int) -> list[str]:
         sheets = exact_field if ideal else BuiltSheets(flaws, exact_field)
         places = [_places(sensor, rng, row.speed) for _ in range(PLACE_COUNT)]
         still = np.array(sheets.admittances(sensor, [[]])[0])
+        learned = np.array(exact_field.admittances(sensor, [[]])[0]) if row.late else still
         change = row.change or (lambda exact, *_: exact)
-        quiet = change(np.repeat(circuit.exact(still)[None], LEARNED_FRAMES, 0), random.Random(seed), circuit)
+        quiet = change(np.repeat(circuit.exact(learned)[None], LEARNED_FRAMES, 0), random.Random(seed), circuit)
         sitting.untouched = circuit.counts(quiet, 1, noise)[:, 0]
         touches = np.array([_touch(sheets, sensor, way, rng, row, still) for way in places])
         frames = change(circuit.exact(touches), random.Random(seed), circuit)
@@ -153,21 +174,24 @@ def measure(row: Row, skins: int) -> list[str]:
             names[str(error)] += PLACE_COUNT
             certain += [False] * PLACE_COUNT
             continue
-        names.update(name for name in said["named"] if name)
+        names.update(name.partition(", or")[0] for name in said["named"] if name)
         for k, way in enumerate(places):
-            du = said["u"][k] - way[:, 0]
-            ds = sensor.frustum.radius1 * (said["phi"][k] - way[:, 1])
+            at = way[np.minimum(moment, FRAME_COUNT - 1)]
+            du = said["u"][k] - at[:, 0]
+            ds = sensor.frustum.radius1 * (said["phi"][k] - at[:, 1])
             uu, us, ss = said["uu"][k], said["us"][k], said["ss"][k]
             square = (ss * du**2 - 2.0 * us * du * ds + uu * ds**2) / (uu * ss - us * us)
-            known = np.isfinite(square) & (np.arange(FRAME_COUNT) >= FIRST_FRAME)
+            known = np.isfinite(square) & (moment >= FIRST_FRAME) & (moment < FRAME_COUNT)
             inside += (square[known] < ELLIPSE_CHI2).tolist()
-            valid = said["valid"][k]
+            valid = said["valid"][k] & (moment < FRAME_COUNT)
             certain.append(bool(valid.any()))
             errors += (1e3 * np.hypot(du, ds)[valid]).tolist()
     off = f"{quantile(errors, 0.5):.2f} / {quantile(errors, 0.95):.2f}"
     held = f"{np.mean(inside):.3f}" if inside else "-"
     most = ", ".join(f"{name} {count}" for name, count in names.most_common(2))
-    return [row.name, off, held, f"{np.mean(certain):.2f}", str(len(certain)), most or "-"]
+    right = sum(count for name, count in names.items() if row.right and name.startswith(row.right))
+    share = f"{right / len(certain):.2f}" if row.right else "-"
+    return [row.name, off, held, f"{np.mean(certain):.2f}", str(len(certain)), share, most or "-"]
 
 
 def _places(sensor: Sensor, rng: random.Random, speed: float) -> np.ndarray:
@@ -187,8 +211,10 @@ def _touch(
     radius, siemens = rng.uniform(0.003, 0.008), math.exp(rng.uniform(math.log(7e-4), math.log(3e-3)))
     contacts = [[LayerContact(u, phi, siemens, radius, radius)] for u, phi in way.tolist()]
     found = sheets.admittances(sensor, contacts if row.speed else contacts[:1])
-    y = np.array(found if row.speed else found * FRAME_COUNT)
+    y = np.array([*(found if row.speed else found * FRAME_COUNT), *[still] * TAIL_COUNT])
     warmed = [rng.gauss(0.0, row.warmed[0])] * 2 + [rng.gauss(0.0, row.warmed[1])] * 2
+    step = rng.uniform(*row.stepped) * rng.choice((-1.0, 1.0))
+    warmed[:2] = warmed[0] + step, warmed[0] + step
     return np.asarray(y - still * np.array(warmed) + leak_admittance(row.damp))
 
 
@@ -200,5 +226,13 @@ def main() -> None:
     args = parser.parse_args()
     print(head("numpy", "scipy"))
     rows = [measure(row, args.skins) for row in ROWS if row.name.startswith(args.rows)]
-    columns = ["effect", "certain places off, median / 95 % [mm]", "in the ellipse", "certain", "touches", "named"]
+    columns = [
+        "effect",
+        "certain places off, median / 95 % [mm]",
+        "in the ellipse",
+        "certain",
+        "touches",
+        "named right",
+        "named",
+    ]
     show(f"skins as they are built, {NAME}, {ELECTRIC}", columns, rows)

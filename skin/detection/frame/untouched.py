@@ -35,6 +35,7 @@ _PRIOR_NOISE: Final = 0.7  # counts; standard deviation that is assumed at the s
 _ROUNDING_VARIANCE: Final = 1.0 / 12.0  # counts^2; variance of rounding alone
 _CURRENT_JUMP: Final = 0.01  # ratio; an untouched current that is off by this has changed
 _JUMP_DEVIATIONS: Final = 8.0
+_ALIKE_SHARE: Final = 0.5  # of the larger change; by less they differ where one thing has changed both
 _ZERO_CHANGE: Final = 0.4  # counts, of the mean of a block; less is noise of where no current flows
 _ZERO_DEVIATIONS: Final = 4.0
 _THRESHOLD_DEVIATIONS: Final = 7.0  # standard deviations from what noise reaches to a threshold: once in 1e11 frames
@@ -113,11 +114,14 @@ class UntouchedCurrents:
             self._last += (1.0 - self._weight) * crept
         limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
         step1, step2 = mean1 - self.radial, mean2 - self.angular
-        if abs(step1) > max(_CURRENT_JUMP * self.radial, limit) or abs(step2) > max(
-            _CURRENT_JUMP * self.angular, limit
-        ):
-            steps = f"radial {100.0 * step1 / self.radial:+.2f} %, angular {100.0 * step2 / self.angular:+.2f} %"
-            return Fault.CURRENT_CHANGED, steps
+        upper = abs(step1) > max(_CURRENT_JUMP * self.radial, limit)
+        lower = abs(step2) > max(_CURRENT_JUMP * self.angular, limit)
+        if upper or lower:
+            part1, part2 = step1 / self.radial, step2 / self.angular
+            where = "the gain of the current, or both sheets"
+            if upper != lower and abs(part1 - part2) > _ALIKE_SHARE * max(abs(part1), abs(part2)):
+                where = f"the {'upper' if upper else 'lower'} sheet, or its bond to {'A or B' if upper else 'C or D'}"
+            return Fault.CURRENT_CHANGED, f"{where}: radial {100.0 * part1:+.2f} %, angular {100.0 * part2:+.2f} %"
         self._learn_noise(mixed - self._last, supply)
         self._last = mixed
         self._blocks = min(self._blocks + 1, _CURRENT_MEMORY)

@@ -41,7 +41,9 @@ _CERTAIN_SHARE = 0.9  # of the limit; what is not certain must fall below it to 
 
 _CURRENTS_UNKNOWN = "the untouched drive currents are not known yet"
 _TOO_FEW_FRAMES = "too few frames yet to exclude a second contact"
-_SEVERAL_CONTACTS = "the drive currents rise unequally, or the guides differ: several contacts, or a long one"
+_SEVERAL_CONTACTS = (
+    "the drive currents rise unequally, or the guides differ: several contacts, a long one, or a sheet that has changed"
+)
 _LARGE_CONTACT = "the drive currents rise more than by one contact: several round this place, or a very large one"
 _COARSE_READINGS = "the readings are too coarse to exclude a second contact so lightly touched"
 

@@ -11,7 +11,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault
 from coneskin.skin.detection.frame.faults import Fault
-from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK, UntouchedZero
+from coneskin.skin.detection.frame.untouched import CURRENT_BLOCK, UntouchedCurrents, UntouchedZero
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts, find_wrong_measurements
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.imperfections import Imperfections
@@ -122,6 +122,26 @@ def test_learned_currents_go_with_a_zero_that_creeps(rate):
     left = 51.0 + rate * 23.0 - detector.zero  # of the zero, in the currents of every frame
     for learned, at in ((detector._currents.radial, 5), (detector._currents.angular, 8)):
         assert learned * counts[9] == pytest.approx(counts[at] - 51.0 + left, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("radial", "angular", "named"),
+    [
+        (0.98, 1.0, "the upper sheet, or its bond to A or B: radial -2.00 %, angular +0.00 %"),
+        (1.001, 1.02, "the lower sheet, or its bond to C or D: radial +0.10 %, angular +2.00 %"),
+        (0.97, 0.982, "the gain of the current, or both sheets: radial -3.00 %, angular -1.80 %"),
+        (0.988, 0.993, "the gain of the current, or both sheets: radial -1.20 %, angular -0.70 %"),
+        (0.97, 1.02, "the gain of the current, or both sheets: radial -3.00 %, angular +2.00 %"),
+    ],
+)
+def test_which_sheet_has_changed_is_named(radial, angular, named):
+    """An electrode of which a fifth has peeled off takes 1.5 % of one current; the other one stays."""
+    currents, (frame,), found = UntouchedCurrents(PLAIN, 1e-4), frames(0, 1), None
+    frame = frame._replace(radial_current=10_000, angular_current=10_000)  # so many that no rounding shows
+    for n in range(20 * CURRENT_BLOCK):
+        now = frame._replace(radial_current=round(1e4 * radial), angular_current=round(1e4 * angular))
+        found = currents.feed(frame if n < 16 * CURRENT_BLOCK else now, 0.005) or found
+    assert found == (Fault.CURRENT_CHANGED, named)
 
 
 @pytest.mark.parametrize(("hertz", "rate"), [(3.0, 500), (5.0, 1000), (10.0, 100)])
