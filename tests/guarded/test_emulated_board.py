@@ -4,6 +4,7 @@ Whatever ends the frames, the arm stands and a line names it.
 """
 
 import sys
+from contextlib import contextmanager
 
 import pytest
 
@@ -15,7 +16,7 @@ from tests.support.firmware.firmware_build import build_emulator, build_sketch, 
 from tests.support.firmware.guarded_board import board_scene
 from tests.support.scenes import START
 
-from .guarded_session import DEADLINE, assert_stopped_on_the_way, fast, moving, run_until_moving, until
+from .guarded_session import DEADLINE, assert_stopped_on_the_way, fast, moving, until
 
 pytestmark = [
     pytest.mark.long,
@@ -25,6 +26,8 @@ pytestmark = [
 pytest.importorskip("rtde_control", reason="the ur_rtde wheel is not installed (there is none for this Python)")
 
 from coneskin.robot.sim.process import SimulatedController, free_host  # noqa: E402
+
+BUSY = "no verdict: this computer is too busy for the emulator of a board"
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +48,41 @@ def board(programs, controller):
         yield emulated
 
 
+def too_slow(fault):
+    """Tell whether a fault is that of an emulator that a busy computer lets run more slowly than the board."""
+    return any(
+        words in fault
+        for words in ("the device's clock runs", "frames arrive too long after", "no valid frame has come")
+    )
+
+
+@contextmanager
+def guarded(controller, board, **named):
+    """Guard the arm, where the emulator keeps up with the time."""
+    for _ in range(3):
+        session = guard(board_scene(controller.host, board.path), **named)
+        try:
+            session.open()
+        except RobotRefused as refused:
+            if not too_slow(str(refused)):
+                raise
+            continue
+        try:
+            yield session
+        finally:
+            session.close()
+        return
+    pytest.skip(BUSY)
+
+
 def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, board, tmp_path):
-    with guard(board_scene(controller.host, board.path), recording=tmp_path / "run.rec") as session:
-        thread, raised = run_until_moving(controller, session)
+    with guarded(controller, board, recording=tmp_path / "run.rec") as session:
+        thread, raised = moving(session)
+        until(lambda: fast(controller) or has_fault(session))
         board.touch(0.13, 1.55, duration=0.4)
         thread.join(DEADLINE)
+        if isinstance(raised[0], RobotRefused) and too_slow(str(raised[0])):
+            pytest.skip(BUSY)
         assert isinstance(raised[0], Collision)
         assert raised[0].u == pytest.approx(0.13, abs=1e-3)
         assert_stopped_on_the_way(controller)
@@ -72,9 +105,8 @@ def has_fault(session):
     ids=["killed", "browned out", "watchdog fired", "supply sags", "unplugged"],
 )
 def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(controller, board, lines, named):
-    silent = "no valid frame has come for too long"
     for _ in range(5):  # an emulator that a busy computer lets wait sends its frames too late, which is a fault before
-        with guard(board_scene(controller.host, board.path)) as session:
+        with guarded(controller, board) as session:
             thread, raised = moving(session)
             until(lambda now=session: fast(controller) or has_fault(now))
             if has_fault(session):
@@ -87,10 +119,10 @@ def test_whatever_happens_to_the_board_the_arm_stops_and_a_line_names_it(control
             fault = session.wait_for(("fault",), DEADLINE)
             assert_stopped_on_the_way(controller)
             thread.join(DEADLINE)
-            if silent in fault.details["what"] and silent not in named:
+            if named not in fault.details["what"] and too_slow(fault.details["what"]):
                 continue  # it took the emulator longer to start anew than a board
             assert named in fault.details["what"]
             assert isinstance(raised[0], RobotRefused)
             assert named in str(raised[0])
             return
-    pytest.skip("no verdict: this computer is too busy for the emulator of a board")
+    pytest.skip(BUSY)
