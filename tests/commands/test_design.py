@@ -332,7 +332,7 @@ def test_sensor_file_holds_every_digit_of_the_shape_and_a_pose_to_read(tmp_path)
             "electronics.current_full_scale_ma=50",
         ],
         ["--radius1-mm", "50", "--radius2-mm", "150", "--height-mm", "85", *sets("sheet.wires=end2")],
-        [*BALL, "--wrap-deg", "200", *sets("sheet.wires=edge1")],
+        [*BALL[:6], "--wrap-deg", "200", *sets("sheet.wires=edge1")],
     ],
 )
 def test_pictures_of_discs_wide_sectors_and_partial_wraps(words, tmp_path):

@@ -27,7 +27,6 @@ BODIES: dict[str, Callable[[], Mesh]] = {
     "barrel": lambda: placed(barrel()),
     "shoulder": lambda: placed(shoulder()),
     "holed": lambda: placed(holed()),
-    "UR10 upper arm": lambda: link("ur/ur10/collision/upperarm.stl"),
     "UR5e forearm": lambda: link("ur/ur5e/visual/forearm.dae"),
     "UF850 link 4": lambda: link("xarm/uf850_link4.stl"),
 }
