@@ -12,6 +12,7 @@ smaller.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Literal, NamedTuple
 
@@ -249,7 +250,8 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     largest, smallest = supply / min(loops), supply / max(loops)
     full_scale = given.current_full_scale
     if full_scale is None:
-        full_scale = given.adc_volts / (SENSE_GAIN * _below(given.adc_volts / (SENSE_GAIN * HEADROOM * largest)))
+        shunt, _ = _of_series(_E96_SERIES, given.adc_volts / (SENSE_GAIN * HEADROOM * largest))
+        full_scale = given.adc_volts / (SENSE_GAIN * shunt)
     bits = given.adc_bits
     if bits is None:
         bits = 12
@@ -257,7 +259,7 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
             bits += 2
     pulldown = given.pulldown_ohms
     if pulldown is None:
-        needed = _above(_PULLDOWN_RATIO * max(radial_ohms, angular_ohms))
+        _, needed = _of_series(_E24_SERIES, _PULLDOWN_RATIO * max(radial_ohms, angular_ohms))
         pulldown = min(max(needed, _MIN_PULLDOWN), _MAX_PULLDOWN, 0.1 * given.input_ohms)
     return Electronics(
         supply_volts=supply,
@@ -276,17 +278,8 @@ def shunt_ohms(electronics: Electronics) -> float:
     return electronics.adc_volts / (SENSE_GAIN * electronics.current_full_scale)
 
 
-def _decade(ohms: float) -> float:
-    return 10.0 ** math.floor(math.log10(min(max(ohms, 1e-9), 1e12)))
-
-
-def _below(ohms: float) -> float:
-    """Return the largest value of the E96 series that is not above a resistance."""
-    decade = _decade(ohms)
-    return max((value for value in _E96_SERIES if value * decade <= ohms), default=1.0) * decade
-
-
-def _above(ohms: float) -> float:
-    """Return the smallest value of the E24 series that is not below a resistance."""
-    decade = _decade(ohms)
-    return min((value for value in _E24_SERIES if value * decade >= ohms), default=10.0) * decade
+def _of_series(series: Sequence[float], ohms: float) -> tuple[float, float]:
+    """Return the values of a series that are next to a resistance: not above it, and not below."""
+    decade = 10.0 ** math.floor(math.log10(min(max(ohms, 1e-9), 1e12)))
+    below = max((value for value in series if value * decade <= ohms), default=1.0)
+    return below * decade, min((value for value in series if value * decade >= ohms), default=10.0) * decade

@@ -238,7 +238,7 @@ class Detector:
             detail: numbers that belong to it.
         """
         events: list[SkinEvent] = []
-        self._put_fault(events, fault, now, self.timing.clock_us, self.timing.sequence, detail)
+        self._report(events, fault, self.timing, now, detail)
         return events
 
     def silence(self, now: float, longest: float) -> list[SkinEvent]:
@@ -254,9 +254,8 @@ class Detector:
         age = self.timing.age(now)
         events: list[SkinEvent] = []
         if age > longest and (self._fault is None or now - self._fed > longest):
-            frame_clock, sequence = self.timing.clock_us, self.timing.sequence
             detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
-            self._put_fault(events, Fault.SILENT, now, frame_clock, sequence, detail)
+            self._report(events, Fault.SILENT, self.timing, now, detail)
         return events
 
     def _while_untouched(self, events: list[SkinEvent], frame: Frame, now: float, level: float) -> None:
@@ -338,11 +337,8 @@ class Detector:
         self._currents.skip()
         self._leak.skip()
 
-    def _report(self, events: list[SkinEvent], fault: Fault, frame: Frame, now: float, detail: str = "") -> None:
-        self._put_fault(events, fault, now, frame.clock_us, frame.sequence, detail)
-
-    def _put_fault(
-        self, events: list[SkinEvent], fault: Fault, now: float, clock_us: int, sequence: int, detail: str
+    def _report(
+        self, events: list[SkinEvent], fault: Fault, at: Frame | FrameTiming, now: float, detail: str = ""
     ) -> None:
         """Take a fault, and report it where it was not. The diagnosis in words counts as another one."""
         self._quiet = self._above = 0
@@ -354,4 +350,4 @@ class Detector:
         told = detail if detail and detail == self._diagnosis.words else fault
         if told not in self._reported:
             self._reported |= {told, fault}
-            events.append(SkinFault(self.sensor.name, now, clock_us, sequence, fault, detail))
+            events.append(SkinFault(self.sensor.name, now, at.clock_us, at.sequence, fault, detail))
