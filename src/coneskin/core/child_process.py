@@ -47,13 +47,10 @@ def _check_memory() -> None:
 
 
 def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
-    """Start ``python -m module`` with these ends of pairs; the child takes them with ``inherit``.
+    """Start ``python -m module`` with these ends of pairs, then closed here; the child takes them with ``inherit``.
 
     The child does not look for modules in the current folder, where a file named like one of them may lie; PYTHONPATH
     holds for it as for this process.
-
-    Args:
-        ends: sockets for the child, closed here afterwards.
 
     Raises:
         RobotConnectionError: the process cannot be started, or may take too little memory.
@@ -178,11 +175,7 @@ class Lifeline:
 
 
 def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Channel]]:
-    """Return the channels that ``spawn`` gave to this process, and the line to its parent.
-
-    Args:
-        parent: position of the channel to the parent.
-    """
+    """Return the line to the parent, and the channels that ``spawn`` gave to this process; one of them goes there."""
     count, *numbers = map(int, arguments)
     channels = [Channel(socket.socket(fileno=number)) for number in numbers[:count]]
     return Lifeline(channels[parent], numbers[count] if len(numbers) > count else None), channels
