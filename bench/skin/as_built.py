@@ -39,7 +39,6 @@ GUIDES = (0, 1, 3, 4, 6, 7)  # of the ten counts
 CURRENTS = (2, 5, 8)
 TAIL_COUNT = 100  # frames after a touch, in which a change of the untouched currents shows
 Frames = np.ndarray
-_ONE_SHEET = "CURRENT_CHANGED: the upper sheet"
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,6 @@ class Row:
         damp: conductance between the layers after learning [S].
         change: of the exact counts, shape (..., frames, 10); told a random source.
         late: the sheets' flaws come after learning.
-        right: words of the name that it should have.
     """
 
     name: str
@@ -72,7 +70,6 @@ class Row:
     damp: float = 0.0
     change: Callable[[Frames, random.Random, ConverterPlant], Frames] | None = None
     late: bool = False
-    right: str = ""
 
 
 def _mains(volts: float) -> Callable[[Frames, random.Random, ConverterPlant], Frames]:
@@ -117,15 +114,14 @@ ROWS = (
         Row(f"both sheets {100 * v:g} % after learning", told=SheetTolerance(drift=v), warmed=(v, v))
         for v in (0.005, 0.02)
     ),
-    Row("one sheet 1 % after learning", told=FILM_SHEETS, warmed=(0.01, 0.0), right=_ONE_SHEET),
-    Row("one sheet 1.2 to 4 % after learning", told=FILM_SHEETS, stepped=(0.012, 0.04), right=_ONE_SHEET),
+    Row("one sheet 1 % after learning", told=FILM_SHEETS, warmed=(0.01, 0.0)),
+    Row("one sheet 1.2 to 4 % after learning", told=FILM_SHEETS, stepped=(0.012, 0.04)),
     *(
         Row(
             f"{100 * part:g} % of an electrode peels after learning",
             FILM_SHEETS,
             peeled=part,
             late=True,
-            right=_ONE_SHEET,
         )
         for part in (0.2, 0.4)
     ),
@@ -186,12 +182,10 @@ def measure(row: Row, skins: int) -> list[str]:
             valid = said["valid"][k] & (moment < FRAME_COUNT)
             certain.append(bool(valid.any()))
             errors += (1e3 * np.hypot(du, ds)[valid]).tolist()
-    off = f"{quantile(errors, 0.5):.2f} / {quantile(errors, 0.95):.2f}"
+    off = f"{quantile(errors, 0.5):.2f}/{quantile(errors, 0.95):.2f}"
     held = f"{np.mean(inside):.3f}" if inside else "-"
-    most = ", ".join(f"{name} {count}" for name, count in names.most_common(2))
-    right = sum(count for name, count in names.items() if row.right and name.startswith(row.right))
-    share = f"{right / len(certain):.2f}" if row.right else "-"
-    return [row.name, off, held, f"{np.mean(certain):.2f}", str(len(certain)), share, most or "-"]
+    told = [f"{name} {count / len(certain):.2f}" for name, count in names.most_common(2)]
+    return [row.name, off, held, f"{np.mean(certain):.2f}", ", ".join(told) or "-"]
 
 
 def _places(sensor: Sensor, rng: random.Random, speed: float) -> np.ndarray:
@@ -226,13 +220,5 @@ def main() -> None:
     args = parser.parse_args()
     print(head("numpy", "scipy"))
     rows = [measure(row, args.skins) for row in ROWS if row.name.startswith(args.rows)]
-    columns = [
-        "effect",
-        "certain places off, median / 95 % [mm]",
-        "in the ellipse",
-        "certain",
-        "touches",
-        "named right",
-        "named",
-    ]
+    columns = ["effect", "certain places off, median/95 % [mm]", "in ellipse", "certain", "named, share of touches"]
     show(f"skins as they are built, {NAME}, {ELECTRIC}", columns, rows)
