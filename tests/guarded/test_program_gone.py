@@ -250,7 +250,7 @@ def test_lines_typed_before_a_collision_reset_nothing(controller, tmp_path):
         process.send_signal(signal.SIGTERM)
         lines += process.stdout.readlines()
         assert sum("  activated" in line for line in lines) == 1, lines
-        assert process.wait(DEADLINE) == 3
+        assert process.wait(DEADLINE) == 3, lines
     finally:
         process.kill()
         process.wait()
