@@ -100,7 +100,7 @@ def read_touch_weights(path: str | Path) -> TouchWeights:
     if missing:
         raise GeometryError(
             f"{path}: a map of weights has the columns {', '.join(_MAP_COLUMNS)} in its first line; "
-            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         )
     rows.fieldnames = head
     values: list[list[float]] = []

@@ -75,7 +75,10 @@ class Cause(Enum):
     CLOCK_MILLISECONDS = "the clock counts microseconds: use micros(), not millis()"
     CLOCK_SECONDS = "the clock counts microseconds: use micros()"
     CLOCK_NANOSECONDS = "the clock counts microseconds: divide by 1000"
-    CLOCK_RATIO = "correct the device's clock: its crystal and prescaler, or the ticks of its timer for a microsecond"
+    CLOCK_RATIO = (
+        "correct the device's clock: its crystal and prescaler, or the ticks of its timer for a microsecond; of a "
+        "simulated skin: the computer is too busy, let it send fewer frames a second"
+    )
     CLOCK_16_BIT = "the clock has 32 bits: extend the 16-bit timer in software"
     CLOCK_JUMPS = "the clock must run evenly: take the time at the end of each frame's touch phase"
     RATE_LOW = "send 200 to 1000 frames a second of each sensor, as the baud rate allows; or raise skin_silence_ms"

@@ -140,7 +140,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     assert run is not None  # argparse has ended the program otherwise
     try:
         code = int(run(args))
-        sys.stdout.flush()  # not at the end of Python, which tells of a reader that is gone
+        print(end="", flush=True)  # not at the end of Python, which tells of a reader that is gone
         return code
     except ConeSkinError as exc:
         print(printable(f"coneskin {args.command}: {exc}"), file=sys.stderr)

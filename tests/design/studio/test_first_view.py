@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.design.link_design import LinkMesh
 from coneskin.design.studio.design_text import electrode_marks
-from coneskin.design.studio.studio_page import _first_view, _seen_shares
+from coneskin.design.studio.first_view import _seen_shares, first_view
 from coneskin.design.studio.workbench import Handles, Workbench
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
@@ -34,7 +34,7 @@ def test_a_narrow_sheet_is_looked_at_from_in_front(bench: Workbench, seam: float
     bench.handle(0, Handles(wrap=math.radians(60.0), seam=math.radians(seam)))
     (design,) = bench.designs
     mesh = bench.link.mesh
-    eye, at = _first_view(bench.designs, RayCaster(mesh), mesh.vertices)
+    eye, at = first_view(bench.designs, RayCaster(mesh), mesh.vertices)
     normal = np.array(design.place.normal(math.radians(30.0)))
     way = np.subtract(eye, at) / np.linalg.norm(np.subtract(eye, at))
     assert way @ normal > math.cos(math.radians(45.0))
@@ -43,10 +43,10 @@ def test_a_narrow_sheet_is_looked_at_from_in_front(bench: Workbench, seam: float
 def test_a_sheet_behind_a_plate_is_looked_at_from_the_side(bench: Workbench) -> None:
     bench.handle(0, Handles())
     mesh = with_plate(bench.link.mesh, 0.08)
-    eye, _ = _first_view(bench.designs, RayCaster(mesh), mesh.vertices)
+    eye, _ = first_view(bench.designs, RayCaster(mesh), mesh.vertices)
     assert eye[0] < 0.08
     mesh = with_plate(bench.link.mesh, -0.08)
-    eye, _ = _first_view(bench.designs, RayCaster(mesh), mesh.vertices)
+    eye, _ = first_view(bench.designs, RayCaster(mesh), mesh.vertices)
     assert eye[0] > -0.08
 
 

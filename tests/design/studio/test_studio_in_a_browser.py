@@ -41,7 +41,7 @@ def test_a_mesh_is_put_onto_the_page_by_the_button(tmp_path: Path) -> None:
         with page.expect_file_chooser() as chooser:
             page.get_by_role("button", name="another link").click()
         chooser.value.set_files(other)
-        wait_for_text(page, "#coneskin-said", "tube.stl: 1 sheets")
+        wait_for_text(page, "#coneskin-said", "tube.stl: 1 sheet")
 
 
 def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
         written = tomllib.loads((folder / "sensor.toml").read_text(encoding="utf-8"))
         assert written
         drop(page, other)
-        wait_for_text(page, "#coneskin-said", "tube.stl: 1 sheets")
+        wait_for_text(page, "#coneskin-said", "tube.stl: 1 sheet")
         assert page.url.startswith(server.url), "the browser has not gone to the file"
         page.wait_for_function(DISTANCE + " < 0.3")  # m; the tube is 0.15 m long
         wait_for_text(page, "#coneskin-facts", "infinite")  # r1 of a cylinder

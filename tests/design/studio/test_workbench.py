@@ -174,7 +174,7 @@ def test_a_seam_that_was_turned_is_said_where_it_is(bench: Workbench) -> None:
 
 
 def test_a_sheet_is_added_where_its_side_is_bare_and_deleted(bench: Workbench) -> None:
-    with pytest.raises(GeometryError, match="side 1 is covered all along"):
+    with pytest.raises(GeometryError, match="surface 1 is covered all along"):
         bench.add(0)
     bench.handle(0, Handles(along=0.10))
     bench.add(0)
@@ -282,7 +282,7 @@ def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench
         page._upload.value = SimpleNamespace(name="../../tube.stl", content=stl(bench.link.mesh))
         page._take_upload()
         assert [link.name for link in other] == ["tube"]
-        assert "1 sheets" in page._said.content
+        assert "1 sheet" in page._said.content
 
 
 def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: Workbench, tmp_path: Path) -> None:
@@ -300,4 +300,4 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
         page._upload = SimpleNamespace(value=SimpleNamespace(name="slow.stl", content=data))
         page._take_upload()
         assert page._bench.link.name == "quick"
-        assert "quick.stl: 1 sheets" in page._said.content
+        assert "quick.stl: 1 sheet" in page._said.content

@@ -50,7 +50,7 @@ def test_only_the_ratio_of_weights_counts(largest: float, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "the columns x_mm, y_mm, z_mm, weight in its first line; x_mm and y_mm and z_mm and weight are missing"),
+        ("", "the columns x_mm, y_mm, z_mm, weight in its first line; x_mm, y_mm, z_mm, weight are missing"),
         ("x_mm,y_mm,z_mm\n1,2,3\n", "weight is missing"),
         (HEAD, "at least one place must have a weight above 0"),
         (HEAD + "0,0,0,0\n", "at least one place must have a weight above 0"),

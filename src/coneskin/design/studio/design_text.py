@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from coneskin.design.sheets.sheet_design import SheetDesign
+from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.part_labels import PartLabel
@@ -180,14 +181,16 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
             ("radii on the link", f"{1e3 * cone.radius1:.2f} and {1e3 * cone.radius2:.2f} mm"),
             ("height, wrap", f"{1e3 * cone.height:.1f} mm, {math.degrees(cone.wrap):.1f} deg"),
             ("active area on the link", f"{1e4 * design.layout.active.area(cone):.1f} cm2"),
-            ("wires", f"4, at {design.layout.plan.wires}"),
-            ("one count", f"{1e3 * min(coarse):.3f} to {1e3 * max(coarse):.3f} mm"),
+            ("wires", f"4, at {side_name(design.layout.plan.wires)}"),
+            ("one ADC count", f"{1e3 * min(coarse):.3f} to {1e3 * max(coarse):.3f} mm"),
         ]
-        layers = [("layer", "r1 [mm]", "r2 [mm]", "theta0 [deg]")]
+        layers = [("layer", "r1 [mm]", "r2 [mm]", "theta0 [deg]", "size [mm]")]
         for cut in design.cuts:
             sector = unroll(cut.surface)
             theta0 = f"{math.degrees(sector.theta0):.2f}"
-            layers.append((cut.name, _radius(sector.r1), _radius(sector.r2), theta0))
+            left, low, right, high = (1e3 * value for value in cut.bounds)
+            size = f"{right - left:.0f} x {high - low:.0f}"
+            layers.append((cut.name, _radius(sector.r1), _radius(sector.r2), theta0, size))
         parts.append(f"<b>{escape(design.name)}</b>{_table(rows)}{_table(layers)}")
     count = f"<b>{4 * len(designs)} wires</b><br>" if designs else ""
     parts = parts or ["no sheet"]
@@ -206,7 +209,7 @@ def robot_facts(links: Sequence[tuple[str, Sequence[SheetDesign] | None]]) -> st
         counts, area = counts + len(designs), area + active
         rows.append((name, str(len(designs)), str(4 * len(designs)), f"{1e4 * active:.1f}"))
     rows.append(("all", str(counts), str(4 * counts), f"{1e4 * area:.1f}"))
-    note = "Joints are not swept here, as <code>coneskin design</code> does: a sheet may meet the next link."
+    note = "Unlike coneskin design, the studio does not check what the joints sweep: a sheet may meet the next link."
     return f'<div id="coneskin-facts" style="font-size:12px;margin:4px 10px">{_table(rows)}<p>{note}</p></div>'
 
 

@@ -1,7 +1,4 @@
-"""Studio's page: the link with its sheets in 3D, handles beside it, and the layers flat.
-
-At first it is seen from where most of the sheets and of their seams is visible, with nothing before them.
-"""
+"""Studio's page: a link with its sheets in 3D or a whole robot, handles beside it, and the layers flat."""
 
 from __future__ import annotations
 
@@ -22,7 +19,6 @@ from coneskin.design.link_design import LinkMesh, load_link
 from coneskin.design.sheets.cable_way import CABLE_RADIUS, MOUNT_REACH
 from coneskin.design.workshop.jig import jig_collars
 from coneskin.geometry.fit.touch_weights import read_touch_weights
-from coneskin.geometry.pose import Vector
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.view.page_server import PageServer
 from coneskin.view.stage_nodes import light_plainly
@@ -37,11 +33,11 @@ from .design_text import (
     robot_facts,
     warning_list,
 )
+from .first_view import first_view
 from .workbench import Handles, RobotLinks, Wish, Workbench
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
-    from coneskin.design.sheets.sheet_design import SheetDesign
 
 #: for the head of the page: a file that is dropped anywhere goes the way of viser's button, which takes one from its
 #: dialogue alone; a browser would leave the page otherwise, and show the file
@@ -70,68 +66,6 @@ FILE_DROP = """<script>
 })();
 </script>"""
 
-_AZIMUTH_COUNT = 24  # directions at each height
-_VIEW_HEIGHTS = (20.0, 45.0, -15.0)  # deg above the horizon, the preferred one first
-_FIRST_AZIMUTH = -40.0  # deg; azimuth that is taken where none is better
-_PLACE_ROWS, _PLACE_COLUMNS = 4, 14  # places of a sheet that are looked at
-_EYE_LIFT = 0.001  # m above the sheet, from where a place is looked for
-_MIN_FACING = 0.15  # cosine; what is turned away by more is seen as a line
-_SEAM_WORTH = 0.3  # worth of seeing all of a seam, beside 1 for all of a sheet
-_HEIGHT_PREFERENCE = 0.1  # by which another height has to be better
-_VIEW_DISTANCE = 1.55  # of the link's largest side
-
-
-def _first_view(designs: Sequence[SheetDesign], rays: RayCaster | None, corners: Floats) -> tuple[Vector, Vector]:
-    """Return from where to look, and at what [m]."""
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    middle, size = 0.5 * (low + high), float((high - low).max())
-    ways = _directions()
-    worth = np.array([-_HEIGHT_PREFERENCE * (row // _AZIMUTH_COUNT > 0) for row in range(len(ways))])
-    if rays is not None:
-        for design in designs:
-            sheet, seam = _seen_shares(design, rays, ways)
-            worth += sheet + _SEAM_WORTH * seam
-    way = ways[int(np.argmax(worth))]  # the first of several that are as good
-    x, y, z = (middle + _VIEW_DISTANCE * size * way).tolist()
-    at_x, at_y, at_z = middle.tolist()
-    return (x, y, z), (at_x, at_y, at_z)
-
-
-def _seen_shares(design: SheetDesign, rays: RayCaster, ways: Floats) -> tuple[Floats, Floats]:
-    """Return how much of a sheet, and of its two edges along the seam, is seen from far off.
-
-    1 is all of it, looked at along its normal; what is seen obliquely counts by the cosine.
-
-    Args:
-        design: the sheet.
-        rays: of the link's mesh.
-        ways: unit vectors towards the eye, shape (n, 3).
-
-    Returns:
-        of the sheet and of its seam, each of shape (n,).
-    """
-    box = design.layout.field
-    u = np.linspace(box.u1, box.u2, _PLACE_ROWS)
-    rows, columns = np.meshgrid(u, np.linspace(box.phi1, box.phi2, _PLACE_COLUMNS), indexing="ij")
-    points, normals = (found.reshape(-1, 3) for found in design.place.place(rows, columns))
-    cosine = normals @ ways.T  # places, ways
-    seen = np.zeros_like(cosine)
-    at, way = np.nonzero(cosine > _MIN_FACING)
-    depth, _ = rays.cast(points[at] + _EYE_LIFT * normals[at], ways[way])
-    seen[at, way] = np.where(np.isfinite(depth), 0.0, cosine[at, way])
-    grid = seen.reshape(_PLACE_ROWS, _PLACE_COLUMNS, len(ways))
-    return seen.mean(axis=0), grid[:, [0, -1]].mean(axis=(0, 1))
-
-
-def _directions() -> Floats:
-    found = []
-    for height in map(math.radians, _VIEW_HEIGHTS):
-        for step in range(_AZIMUTH_COUNT):
-            turn = math.radians(_FIRST_AZIMUTH) + 2.0 * math.pi * step / _AZIMUTH_COUNT
-            found.append((math.cos(height) * math.cos(turn), math.cos(height) * math.sin(turn), math.sin(height)))
-    return np.array(found)
-
-
 _LINK_COLOR = (205, 208, 214)
 _SHEET_COLOR = (164, 205, 150)
 _CABLE_COLOR = (55, 65, 81)
@@ -143,7 +77,7 @@ _HANDLE_STEP = 0.5  # mm and deg of the handles
 _SHORTEST = 10.0  # mm along the axis
 _MOST_WIRES = 40
 _ALL_LINKS = "the whole robot"
-_EVEN, _FREE = "all areas alike", "what is free above it"
+_EVEN, _FREE = "all areas alike", "open space above it"
 
 
 class StudioPage:
@@ -170,6 +104,7 @@ class StudioPage:
         self._bench = shown if isinstance(shown, Workbench) else None
         self._lock = threading.Lock()  # the page's callbacks come from several threads
         self._held: tuple[int, str] | None = None  # handle that made the last change
+        self._replaceable: set[Path] = set()  # folders that were written here, or that were asked for twice
         gui = server.gui
         if self._robot is not None:
             self._link = gui.add_dropdown("link", [_ALL_LINKS, *self._robot.names], initial_value=_ALL_LINKS)
@@ -185,7 +120,8 @@ class StudioPage:
         self._layer = gui.add_dropdown("layer", ["none"], initial_value="none")
         self._layer.on_update(lambda _event: self._draw_flat())
         self._flat = gui.add_html("")
-        self._handles: list[Any] = []  # one folder for each sheet, and the buttons that add one to a side
+        self._handles: list[Any] = []  # one folder for each sheet, and the buttons that add one to a surface
+        self._titles: list[Any] = []  # of the sheets
         self._place_of_handles = gui.add_folder("sheets")
         with self._place_of_handles:
             self._undo = gui.add_button("undo")
@@ -218,7 +154,7 @@ class StudioPage:
             self._draw_robot()
         else:
             self._rays = RayCaster(self._bench.link.mesh)
-            self._server.look_from(*_first_view(self._bench.designs, self._rays, self._bench.link.mesh.vertices))
+            self._server.look_from(*first_view(self._bench.designs, self._rays, self._bench.link.mesh.vertices))
             self._legend.content = legend(self._bench.wish.fit.tolerance)
             self._add_mesh("/link", self._bench.link.mesh.vertices, self._bench.link.mesh.faces, _LINK_COLOR)
             self._draw()
@@ -243,7 +179,7 @@ class StudioPage:
                 faces = np.arange(len(triangles)).reshape(-1, 3)
                 self._add_mesh(f"/robot/{name}/{design.name}", triangles, faces, _SHEET_COLOR)
             rows.append((name, None if bench is None else bench.designs))
-        self._server.look_from(*_first_view((), None, np.concatenate(corners)))
+        self._server.look_from(*first_view((), None, np.concatenate(corners)))
         self._legend.content, self._flat.content, self._warnings.content = "", "", ""
         self._facts.content = robot_facts(rows)
 
@@ -262,20 +198,21 @@ class StudioPage:
                 return
             self._bench, self._held = bench, None
             self._stand()
-        self._say("" if bench is None else f"{name}: {len(bench.designs)} sheets")
+        self._say("" if bench is None else f"{name}: {_count_of(bench.designs)}")
 
     def _make_handles(self) -> None:
         for made in self._handles:
             made.remove()
-        self._handles, bench, gui = [], self._bench, self._server.gui
+        self._handles, self._titles, bench, gui = [], [], self._bench, self._server.gui
         if bench is None:
             return
         with self._place_of_handles:
             for number, handles in enumerate(bench.wish.handles):
-                self._handles.append(gui.add_folder(""))
+                self._handles.append(gui.add_folder(f"on surface {handles.side + 1}"))
                 with self._handles[-1]:
+                    self._titles.append(gui.add_html(""))
                     self._handles_of(number, handles)
-            sides = [f"side {number}" for number in range(1, len(bench.wish.fit.sheets) + 1)]
+            sides = [f"surface {number}" for number in range(1, len(bench.wish.fit.sheets) + 1)]
             if sides:
                 adding = gui.add_button_group("add a sheet", sides)
                 adding.on_click(lambda _event: self._change(lambda bench: bench.add(sides.index(adding.value))))
@@ -287,8 +224,8 @@ class StudioPage:
         bench = self._bench
         assert bench is not None
         names = dict(zip(bench.places, (design.name for design in bench.designs), strict=True))
-        for number, handles in enumerate(bench.wish.handles):
-            self._handles[number].label = f"{names.get(number, 'cannot be made')}, on side {handles.side + 1}"
+        for number, title in enumerate(self._titles):
+            title.content = _note("coneskin-sheet", names.get(number, "cannot be made"))
 
     def _handles_of(self, number: int, handles: Handles) -> None:
         """Make the sliders of one sheet, and the button that deletes it."""
@@ -301,16 +238,22 @@ class StudioPage:
             for value, unit, most in ((handles.length, 1e3, longest), (handles.wrap, 180.0 / math.pi, widest))
         )
         sliders = {
-            "along [mm]": gui.add_slider(
-                "along [mm]",
+            "start": gui.add_slider(
+                "start [mm]",
                 0.0,
                 max(longest - _SHORTEST, 1.0),
                 _HANDLE_STEP,
                 min(round(1e3 * handles.along, 1), longest),
             ),
-            "length [mm]": gui.add_slider("length [mm]", _SHORTEST, longest, _HANDLE_STEP, length),
-            "wrap [deg]": gui.add_slider("wrap [deg]", 30.0, widest, 0.1, wrap),
-            "seam [deg]": gui.add_slider("seam [deg]", 0.0, turn, _HANDLE_STEP, round(math.degrees(handles.seam), 1)),
+            "length": gui.add_slider("length [mm]", _SHORTEST, longest, _HANDLE_STEP, length),
+            "wrap": gui.add_slider("wrap [deg]", 30.0, widest, 0.1, wrap),
+            "turn": gui.add_slider(
+                f"{'seam' if turn == 360.0 else 'turn'} [deg]",
+                0.0,
+                turn,
+                _HANDLE_STEP,
+                round(math.degrees(handles.seam), 1),
+            ),
         }
         made, moves = self._handles, dict.fromkeys(sliders, 0)
 
@@ -369,7 +312,7 @@ class StudioPage:
             self._say(str(exc))
             return
         self._change(lambda bench: bench.change(wish))
-        self._say(f"{len(wish.handles)} sheets")
+        self._say(f"found {_count_of(wish.handles)}")
 
     def _draw(self) -> None:
         """Draw the sheets as they are now, with their cables, on the link and in the panel."""
@@ -415,6 +358,7 @@ class StudioPage:
         if list(self._layer.options) != layers:
             self._layer.options = layers
             self._layer.value = next((layer for layer in layers if layer.endswith(_SHOWN_FIRST)), layers[0])
+        self._tell("")
         self._draw_flat()
 
     def _draw_flat(self) -> None:
@@ -445,41 +389,48 @@ class StudioPage:
             stem = "".join(letter for letter in Path(file.name).stem if letter.isalnum() or letter in "-_ ")[:40]
             bench = self._load(LinkMesh(stem or "link", found.mesh, found.frame, found.notes))
         except (ConeSkinError, OSError) as exc:
-            self._say(f"{file.name}: {exc}")
+            self._say(f"{file.name}: {str(exc).removeprefix(f'{path}: ')}")
             return
         with self._lock:
             if self._upload.value is not file:  # another was dropped meanwhile, and is the one that is wanted
                 return
             self._bench, self._held = bench, None
             self._stand()
-        self._say(f"{file.name}: {len(bench.designs)} sheets")
+        self._say(f"{file.name}: {_count_of(bench.designs)}")
 
     def _take_map(self, file: Any) -> None:
         """Take a map of touches, by which sheets may then be found again."""
+        self._say(f"reading {file.name} ...")
         try:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "map.csv"
                 path.write_bytes(file.content)
                 self._map = replace(read_touch_weights(path), name=file.name)
         except (ConeSkinError, OSError) as exc:
-            self._say(f"{file.name}: {exc}")
+            self._say(f"{file.name}: {str(exc).removeprefix(f'{path}: ')}")
             return
         self._count.options = [_EVEN, _FREE, file.name]
         self._count.value = file.name
-        self._say(f'{file.name}: find the sheets again by it, with the button "find sheets"')
+        self._say(f'{file.name} is loaded: press "find sheets" to use it')
 
     def _written(self) -> None:
+        bench = self._bench
+        if bench is None:
+            return
+        folder = self._folder if self._robot is None else self._folder / bench.link.name
+        if folder.exists() and not self._overwrite and folder not in self._replaceable:
+            self._replaceable.add(folder)
+            self._tell(f"{folder} exists already: press again to replace the design in it")
+            return
         self._write.disabled = True
-        self._tell(f"writing {self._folder} ... (drawings and pictures take some seconds)")
+        self._tell(f"writing {folder} ... (drawings and pictures take some seconds)")
         try:
             with self._lock:
-                bench = self._bench
-                assert bench is not None
-                folder = self._folder if self._robot is None else self._folder / bench.link.name
-                files = bench.write(folder, self._overwrite)
+                files = bench.write(folder, overwrite=True)
         except ConeSkinError as exc:
             self._tell(str(exc))
         else:
+            self._replaceable.add(folder)
             next_step = f"coneskin init {shlex.quote(str(folder))} --simulated"
             self._tell(f"written: {len(files)} files in {folder}; next: {next_step}")
         finally:
@@ -490,6 +441,10 @@ class StudioPage:
 
     def _tell(self, text: str) -> None:
         self._told.content = _note("coneskin-told", text)
+
+
+def _count_of(sheets: Sequence[object]) -> str:
+    return f"{len(sheets)} sheet{'s'[: len(sheets) != 1]}"
 
 
 def _note(name: str, text: str) -> str:

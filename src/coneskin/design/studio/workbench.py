@@ -105,7 +105,7 @@ class Wish:
         notes: tuple[str, ...] = ()
         if fit.sheets:
             turned, fit = with_seams(link, fit, lambda _step: None, search.get("weights"))
-            notes = turned.notes[len(link.notes) :]
+            notes = tuple(note.removesuffix("; --seam puts it elsewhere") for note in turned.notes[len(link.notes) :])
         return cls(fit, tuple(Handles(side) for side in range(len(fit.sheets))), notes, search)
 
     @property
@@ -195,7 +195,7 @@ class Workbench:
         stops = [*(start - gap for start, _ in ends), found.height]
         length, along = max((stop - start, start) for start, stop in zip(starts, stops, strict=True))
         if length < _MIN_LENGTH:
-            raise GeometryError(f"side {side + 1} is covered all along: make the sheet on it shorter first")
+            raise GeometryError(f"surface {side + 1} is covered all along: make the sheet on it shorter first")
         new = Handles(side) if not taken else Handles(side, along, length)
         self.change(replace(self.wish, handles=(*self.wish.handles, new)))
 
@@ -213,7 +213,7 @@ class Workbench:
             try:
                 fits[number] = self.wish.sheet(handles)
             except GeometryError as exc:
-                refused.append(f"no sheet on side {handles.side + 1}: {exc}")
+                refused.append(f"no sheet on surface {handles.side + 1}: {exc}")
         found = self.wish.fit
         bare = found.bare_areas if self.wish.untouched else ()
         self._fit = replace(found, sheets=tuple(fits.values()), bare_areas=bare)
