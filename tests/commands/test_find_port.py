@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.commands.find_port import _await_port, _port_trouble, _stable_name
+from coneskin.commands.find_port import _await_port, _port_trouble, _settled_port, _stable_name
 from coneskin.core.errors import SkinTimeout
 from coneskin.skin.sources.serial_port import PortFacts
 
@@ -64,6 +64,18 @@ def test_a_port_that_is_not_permitted_says_what_to_do(tmp_path: Path, monkeypatc
         f"{port}: not permitted; run `sudo usermod -aG {port.group()} $USER`, and log in again"
     )
     assert _port_trouble(str(tmp_path / "none")) == f"{tmp_path / 'none'}: no such port"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="ports have no groups there")
+def test_a_port_that_a_busy_computer_permits_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    port, waited = tmp_path / "ttyUSB0", list[float]()
+    port.touch()
+    monkeypatch.setattr(os, "access", lambda *_: len(waited) >= 8)
+    assert _settled_port(str(port), waited.append) == ("", str(port))
+    assert len(waited) == 8
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert "not permitted" in _settled_port(str(port), waited.append)[0]
+    assert sum(waited) < 8 * 0.2 + 3.0
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links there need rights")

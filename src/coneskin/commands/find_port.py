@@ -27,6 +27,7 @@ from .terminal import print_line
 
 _BY_ID = Path("/dev/serial/by-id")
 _POLL_PERIOD = 0.2  # s between two looks at the list of ports
+_MAX_LOOKS = 15  # at a port that has just come: a busy computer gives its rights and its lasting name only then
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         return _list(find_ports(), args.json)
     say = partial(print_line, file=sys.stderr)
     port = _await_port(find_ports, say, args.timeout_s)
-    trouble, name = _port_trouble(port.device), _stable_name(port.device)
+    trouble, name = _settled_port(port.device)
     facts = {"port": name, "device": port.device, "hardware": port.hardware, "trouble": trouble}
     print(json.dumps(facts) if args.json else name)
     if trouble:
@@ -120,6 +121,14 @@ def _stable_name(device: str, folder: Path = _BY_ID) -> str:
     except OSError:
         return device
     return next((str(link) for link in links if link.resolve() == Path(device).resolve()), device)
+
+
+def _settled_port(device: str, sleep: Callable[[float], None] = time.sleep) -> tuple[str, str]:
+    """Return what stands against the use of a port that has just come, and its name that stays."""
+    looks = 0
+    while (found := (_port_trouble(device), _stable_name(device)))[0] and (looks := looks + 1) < _MAX_LOOKS:
+        sleep(_POLL_PERIOD)
+    return found
 
 
 def _port_trouble(device: str) -> str:
