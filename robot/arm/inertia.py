@@ -37,6 +37,7 @@ from .models import arm_model
 from .vectors import added, cross, dot, minus, scaled
 
 _HELD_SHARE = 1.25  # of its highest torque, that a joint at rest withstands by friction; fitted to the UR5's elbow
+_LEAST_BRAKING = 0.5  # rad/s^2
 #: of an arm that stands upright [m/s^2]; as a UR controller has it until it is told another
 GRAVITY = 9.82
 
@@ -158,6 +159,19 @@ def highest_acceleration(
         if slope:
             found = min(found, (most - math.copysign(torque, torque * slope)) / abs(slope))
     return found
+
+
+def held_braking(model: ArmModel, inertias: Sequence[ArmInertia], q: Sequence[float], qd: Sequence[float]) -> float:
+    """Return the hardest braking of the leading joint for which the motors have the torque, upright [rad/s^2].
+
+    It is the least of some inertias, such as that of a bare arm and of one with all that it may carry; infinite where
+    the arm stands, and at least `_LEAST_BRAKING`, where a real arm would sag.
+    """
+    lead = max(map(abs, qd))
+    if lead == 0.0:
+        return math.inf
+    against = [-speed / lead for speed in qd]
+    return max(_LEAST_BRAKING, min(highest_acceleration(model, one, q, qd, against) for one in inertias))
 
 
 def _columns(rows: Tensor) -> Tensor:

@@ -7,17 +7,17 @@ what is measured becomes a cue, and what follows from it becomes commands.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from coneskin.core.errors import RobotRefused
-from coneskin.robot.arm.model import ArmModel
+from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.driver.messages import EndReaction, Release, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver
 from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.reaction.rules import RuleSet
-from coneskin.robot.reaction.types import ArmState, Done
+from coneskin.robot.reaction.types import ArmState, Done, Reaction
 from coneskin.robot.stop.arm_stop import ArmStop
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.state_age import StateAge
@@ -53,6 +53,8 @@ class ArmSupervisor:
         planner: of motions away from a touch. None where no reaction moves the arm.
         heartbeat: supervision of the program that moves the arm. None where that is the driver process.
         speed_limit: of the skins' surfaces. None where nothing limits them.
+        held_braking: returns the deceleration that the motors hold at joint positions and speeds [rad/s2]. None where
+            what the arm weighs is not known: then it is taken to brake as commanded.
 
     Attributes:
         model, driver, heartbeat: as given.
@@ -77,6 +79,7 @@ class ArmSupervisor:
         planner: ReactionPlanner | None = None,
         heartbeat: ControllerHeartbeat | None = None,
         speed_limit: SpeedLimit | None = None,
+        held_braking: Callable[[Joints, Joints], float] | None = None,
     ) -> None:
         self.supervision = Supervision()
         self.state: ControllerState | None = None
@@ -92,6 +95,7 @@ class ArmSupervisor:
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
+        self._held_braking = held_braking
         self._planner = planner
         self._motion: MotionStream | None = None  # that is under way
         self._at_touch: ArmState | None = None  # in which the cause of the newest stop was seen
@@ -192,7 +196,7 @@ class ArmSupervisor:
         if phase is Phase.ACTIVE:
             self._reaction, slow = reaction, self.speed_reduction
             if reaction.kind == "slow" and slow.begin(
-                now, self.state, reaction, self._limits, [contact.on_link()], out
+                now, self.state, self._as_held(reaction), self._limits, [contact.on_link()], out
             ):
                 self._follow(now, Cue.SLOWED, "", out)
                 return
@@ -321,8 +325,16 @@ class ArmSupervisor:
         if motion is not None:
             motion.end(out)
         speed = None if state is None or self.state_age.silent(now) else state.speed
-        self._stop.begin(now, speed)
+        self._stop.begin(now, speed, self._held(state))
         return motion
+
+    def _held(self, state: ControllerState | None) -> float:
+        """Return the deceleration that the motors hold, as far as that is known [rad/s2]; it takes a millisecond."""
+        return math.inf if state is None or self._held_braking is None else self._held_braking(state.q, state.qd)
+
+    def _as_held(self, reaction: Reaction) -> Reaction:
+        """Return a reaction whose stop is no harder than the motors hold now."""
+        return replace(reaction, deceleration=min(reaction.deceleration, self._held(self.state)))
 
     def _stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
         """Take a fresh state of a stop under way, report what it shows, and tell whether the arm stands."""

@@ -59,12 +59,18 @@ class ArmStop:
         """True where the newest stop, whose arm stands, took no other path than the first."""
         return self._monitor is not None and self._monitor.used == [self._first]
 
-    def begin(self, now: float, speed: float | None) -> None:
-        """Begin to monitor the stop that was sent, from a host time [s] and the largest joint speed, if known, on."""
+    def begin(self, now: float, speed: float | None, held: float = math.inf) -> None:
+        """Begin to monitor the stop that was sent.
+
+        Args:
+            now: host time [s].
+            speed: largest joint speed, if known [rad/s].
+            held: deceleration that the arm's motors hold at most; infinite where that is not known [rad/s2].
+        """
         order, deceleration = self._sent
         if order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
-        budget = self._limits.stop_budget(speed or 0.0, deceleration)
+        budget = self._limits.stop_budget(speed or 0.0, min(deceleration, held))
         self._monitor = StopMonitor(now, speed, order, self._limits, budget)
         self.watch.end()
 

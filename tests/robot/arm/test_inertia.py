@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from coneskin.core.errors import KinematicsError
-from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, joint_torques, mass_matrix
+from coneskin.robot.arm.inertia import GRAVITY, arm_inertia, held_braking, joint_torques, loaded, mass_matrix
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 
@@ -100,3 +102,20 @@ def test_no_digit_of_a_table_has_changed(name: str) -> None:
     links = arm_inertia(name).links
     numbers = [value for link in links for row in ((link.mass,), link.centre, *link.tensor) for value in row]
     assert round(1e9 * sum(map(abs, numbers))) == _TABLE_SUMS[name]
+
+
+@pytest.mark.parametrize("payload", [0.0, 10.0])
+def test_with_the_braking_that_is_held_one_motor_gives_all_that_it_has(payload: float) -> None:
+    model, bare = arm_model("UR10e"), arm_inertia("UR10e")
+    q, qd = (0.3, -0.2, 0.4, -1.1, 0.9, 0.5), (0.4, 0.9, -0.7, 0.6, 0.5, -0.8)
+    inertia = loaded(bare, payload, (0.0, 0.02, 0.1))
+    held = held_braking(model, (inertia,), q, qd)
+    torques = joint_torques(model, inertia, q, qd, [-held * speed / 0.9 for speed in qd])
+    assert max(abs(t) / most for t, most in zip(torques, inertia.torque, strict=True)) == pytest.approx(1.0)
+    assert held_braking(model, (bare, inertia), q, qd) <= held
+    assert held_braking(model, (inertia,), q, (0.0,) * 6) == math.inf
+
+
+def test_a_joint_that_no_motor_holds_has_the_least_braking() -> None:
+    model, heavy = arm_model("UR3e"), loaded(arm_inertia("UR3e"), 30.0, (0.0, 0.0, 0.0))
+    assert held_braking(model, (heavy,), (0.0,) * 6, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)) == 0.5

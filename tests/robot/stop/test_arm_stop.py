@@ -1,5 +1,7 @@
 """Stop of an arm under guard: paths that are left, the watch at standstill, programs that start again, late states."""
 
+import math
+
 import pytest
 
 from coneskin.robot.driver.messages import StopProgram
@@ -22,6 +24,20 @@ def test_a_way_that_is_lost_is_not_tried(lost, first):
     assert rig.core.phase is Phase.LATCHED
     rig.reset()
     assert "it is gone" in rig.event("refused").details["reasons"]
+
+
+@pytest.mark.parametrize("held", [math.inf, 2.5])
+def test_a_stop_has_the_time_that_the_motors_take(held):
+    """At 2 rad/s it is told to brake with 10 rad/s2, and the motors have 2.5: 0.8 s, not 0.2 and four times 25 ms."""
+    rig = GuardRig(touch(0.5, 0.9), external=True, speed=2.0)
+    go = rig.arm.go
+    rig.arm.go = lambda target, acceleration: go(target, min(acceleration, 2.5))
+    rig.core._arm._held_braking = lambda q, qd: held if any(qd) else math.inf
+    rig.run(2.5)
+    assert rig.core.phase.stands
+    first, *others = rig.arm.commands
+    assert first is StopPath.PROGRAM
+    assert bool(others) == (held == math.inf)
 
 
 def test_with_its_own_connections_gone_at_once_the_guard_asks_the_watchdog():

@@ -60,6 +60,15 @@ def test_an_arm_that_does_not_become_slower_is_stopped():
 
 
 @pytest.mark.promise("P07")
+def test_an_arm_whose_motors_brake_softer_has_the_time_that_these_take():
+    rig = GuardRig(touch(0.5, 0.9), reaction=SLOW, speed=1.0)
+    rig.arm.heeds = False
+    rig.core._arm._held_braking = lambda q, qd: 4.0 if any(qd) else math.inf
+    rig.run(1.5)
+    # 1 rad/s at 4 rad/s2, and four times 25 ms
+    assert rig.event("stopping").time - rig.event("speed_reduced").time == pytest.approx(0.35, abs=0.002)
+
+
 def test_a_touch_that_lasts_too_long_stops():
     rig = GuardRig(touch(0.5), reaction=SLOW, speed=1.0).run(1.7)
     assert rig.core.phase is Phase.LATCHED
