@@ -29,7 +29,7 @@ def test_a_way_that_is_lost_is_not_tried(lost, first):
 @pytest.mark.parametrize("held", [math.inf, 2.5])
 def test_a_stop_has_the_time_that_the_motors_take(held):
     """At 2 rad/s it is told to brake with 10 rad/s2, and the motors have 2.5: 0.8 s, not 0.2 and four times 25 ms."""
-    rig = GuardRig(touch(0.5, 0.9), external=True, speed=2.0)
+    rig = GuardRig(touch(0.5, 0.9), reaction=Reaction(kind="stop"), external=True, speed=2.0)
     go = rig.arm.go
     rig.arm.go = lambda target, acceleration: go(target, min(acceleration, 2.5))
     rig.core._arm._held_braking = lambda q, qd: held if any(qd) else math.inf
