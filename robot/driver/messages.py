@@ -90,7 +90,8 @@ class Shutdown(NamedTuple):
         return b"F"
 
 
-_WORD_COMMANDS: dict[bytes, Heartbeat | Shutdown] = {word.encode(): word for word in (Heartbeat(), Shutdown())}
+#: written out: compiled, a loop over both takes them for plain tuples without items
+_WORD_COMMANDS: dict[bytes, Heartbeat | Shutdown] = {b"A": Heartbeat(), b"F": Shutdown()}
 GuardCommand = StopProgram | SetJointVelocity | EndReaction | Release | Heartbeat | Shutdown
 
 
