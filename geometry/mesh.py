@@ -9,10 +9,10 @@ import io
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -34,17 +34,10 @@ def _outermost_points(points: Floats) -> Floats:
         return points
 
 
-@dataclass(frozen=True, slots=True)
-class _ColladaAsset:
-    """The asset element of a COLLADA document.
+class _ColladaAsset(NamedTuple):
+    """Asset element of a COLLADA document; what is missing there has COLLADA's own defaults."""
 
-    Attributes:
-        unit: name of the unit.
-        metres: length of the unit [m].
-        up_axis: the axis that the file calls up: X_UP, Y_UP or Z_UP.
-    """
-
-    unit: str = "m"  # COLLADA's own defaults for missing elements
+    unit: str = "m"
     metres: float = 1.0
     up_axis: str = "Y_UP"
 
@@ -56,9 +49,9 @@ def _read_collada_asset(path: Path, data: bytes) -> _ColladaAsset:
         root = ElementTree.fromstring(data)
         # a tool's own unit may stand in an extra inside, and parts of the document have assets of their own
         if (unit := root.find("{*}asset/{*}unit")) is not None:
-            asset = replace(asset, unit=unit.get("name", "unit"), metres=float(unit.get("meter", "1")))
+            asset = asset._replace(unit=unit.get("name", "unit"), metres=float(unit.get("meter", "1")))
         if (up_axis := root.find("{*}asset/{*}up_axis")) is not None:
-            asset = replace(asset, up_axis=(up_axis.text or asset.up_axis).strip())
+            asset = asset._replace(up_axis=(up_axis.text or asset.up_axis).strip())
     except ElementTree.ParseError as error:
         raise MeshError(f"{path}: malformed XML: {error}") from error
     except ValueError as error:

@@ -6,8 +6,7 @@ import re
 
 import pytest
 
-from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.sector import unroll
+from coneskin.geometry.frustum import Frustum, unroll
 from coneskin.skin.sensor import Sensor
 from tests.support.flat_pattern import locate_flat
 from tests.support.paths import ROOT
@@ -15,7 +14,7 @@ from tests.support.paths import ROOT
 DOCUMENT = (ROOT / "docs" / "understand" / "conventions.md").read_text(encoding="utf-8")
 HOMES = {
     "Frustum": "coneskin.geometry.frustum",
-    "Sector": "coneskin.geometry.sector",
+    "Sector": "coneskin.geometry.frustum",
     "PlacedFrustum": "coneskin.geometry.placed_frustum",
     "Sensor": "coneskin.skin.sensor",
     "Electronics": "coneskin.skin.electronics",

@@ -61,7 +61,7 @@ CASES: dict[str, tuple[str, str, set[str], set[str]]] = {
     "design only: unroll": (
         "",
         "from coneskin.cli import main; main(['unroll', '--radius1-mm', '54', '--height-mm', '434'])",
-        {"coneskin.geometry.sector"},
+        {"coneskin.geometry.frustum"},
         HEAVY | {"coneskin.skin", "coneskin.robot", "coneskin.scene.reader", "coneskin.design.sheets.sheet_design"},
     ),
     "one cylinder, read": (

@@ -33,12 +33,11 @@ import numpy as np
 from bench.report import head
 from coneskin.core.errors import MeshError
 from coneskin.geometry.fit import candidates as hypotheses
-from coneskin.geometry.fit.axis_plan import SheetRequirements
+from coneskin.geometry.fit.axis_plan import SheetRequirements, fitted_sheet
 from coneskin.geometry.fit.candidates import AxisCandidate, SampledLink, _find_revolution_axis
 from coneskin.geometry.fit.coarse_packing import Choice, grown, survey_axes
 from coneskin.geometry.fit.cone_fit import fit_cone
 from coneskin.geometry.fit.cones import LEAST_GAIN, FineStage, find_cones
-from coneskin.geometry.fit.fitted_sheet import fitted_sheet
 from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
 from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.ray_casting import RayCaster

@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from bench.report import head
 from coneskin.geometry.displacement_map import measure_displacement
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit, find_cones
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
 from coneskin.geometry.pose import Vector
 from coneskin.geometry.ray_casting import RayCaster

@@ -37,11 +37,10 @@ from numpy.typing import NDArray
 from bench.report import head
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.fit.surface_samples import SurfaceSamples, sample_surface
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, unroll
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.sector import unroll
 
 Floats = NDArray[np.float64]
 FIT_TOLERANCE = 0.001

@@ -10,23 +10,23 @@ from .cut_sheet import LINE_COLOURS, CutSheet
 from .outline import Outline, joint_bounds
 from .part_labels import CAP_HEIGHT, PartLabel
 
+_BORDER_WIDTH = 5e-3  # m; of the empty space around the drawing
 _MAX_ARC_RADIUS = 10.0  # m; beyond it a renderer in single precision misplaces the centre by more than 1 um
 
 
-def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin", border: float = 5e-3) -> str:
+def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin") -> str:
     """Write cut sheets as one SVG text.
 
     Args:
         sheets: the sheets, drawn in their own coordinates.
         title: of the document.
-        border: empty space around the drawing [m].
 
     Returns:
         the text of the file.
     """
     x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
-    left, top = x0 - border, y1 + border
-    width, height = (x1 + border - left) * 1e3, (top - y0 + border) * 1e3
+    left, top = x0 - _BORDER_WIDTH, y1 + _BORDER_WIDTH
+    width, height = (x1 + _BORDER_WIDTH - left) * 1e3, (top - y0 + _BORDER_WIDTH) * 1e3
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" '

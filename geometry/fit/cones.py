@@ -16,13 +16,12 @@ import numpy as np
 from coneskin.core.arrays import Floats
 from coneskin.geometry.mesh import Mesh
 
-from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, plan_sheets
+from .axis_plan import AxisPlan, FittedSheet, SheetRequirements, SideLine, fitted_sheet, kept_clear, plan_sheets
 from .bare_areas import BareArea, bare_areas, hull_note
 from .candidates import SampledLink, sample_link
 from .coarse_packing import AxisSurvey, Choice, better_surveys, packings, survey_axes
 from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import MOST_TOLERANCE, FitOptions, check_names
-from .fitted_sheet import FittedSheet, fitted_sheet
 from .profile import AxisFrame, RadialProfile
 from .side import StraightSide, facet_offset
 from .touch_weights import TouchWeights

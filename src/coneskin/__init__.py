@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from .geometry.fit.cones import find_cones as find_cones
     from .geometry.fit.fit_options import FitOptions as FitOptions
     from .geometry.frustum import Frustum as Frustum
+    from .geometry.frustum import Sector as Sector
+    from .geometry.frustum import roll_up as roll_up
+    from .geometry.frustum import unroll as unroll
     from .geometry.mesh import load_mesh as load_mesh
     from .geometry.placed_frustum import PlacedFrustum as PlacedFrustum
     from .geometry.pose import Pose as Pose
-    from .geometry.sector import Sector as Sector
-    from .geometry.sector import roll_up as roll_up
-    from .geometry.sector import unroll as unroll
     from .robot.arm.models import arm_model as arm_model
     from .robot.driver.values import Waypoint as Waypoint
     from .robot.guard.signals.journal import EventName as EventName
@@ -89,11 +89,10 @@ _PUBLIC = {
     "SkinConnectionError SkinError SkinTimeout",
     "geometry.fit.cones": "find_cones",
     "geometry.fit.fit_options": "FitOptions",
-    "geometry.frustum": "Frustum",
+    "geometry.frustum": "Frustum Sector roll_up unroll",
     "geometry.mesh": "load_mesh",
     "geometry.placed_frustum": "PlacedFrustum",
     "geometry.pose": "Pose",
-    "geometry.sector": "Sector roll_up unroll",
     "runs.replay.run": "Run read_run",
     "robot.arm.models": "arm_model",
     "robot.driver.values": "Waypoint",

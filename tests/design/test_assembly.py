@@ -9,8 +9,8 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.assembly import clear_of_each_other, sheet_gap
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_assembly, design_sheets
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone

@@ -8,8 +8,8 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import design_sheets
 from coneskin.design.sheets.summary import design_summary
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit, find_cones
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum

@@ -9,8 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from coneskin.core.errors import GeometryError
-from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.sector import unroll
+from coneskin.geometry.frustum import Frustum, unroll
 from tests.support.flat_pattern import locate_flat
 
 from .frustum_cases import RTOL, close, exact, fractions, frusta

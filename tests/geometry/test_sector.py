@@ -7,8 +7,7 @@ import pytest
 from hypothesis import assume, given
 
 from coneskin.core.errors import GeometryError
-from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.sector import Sector, roll_up, unroll
+from coneskin.geometry.frustum import Frustum, Sector, roll_up, unroll
 
 from .frustum_cases import RTOL, close, exact, frusta
 

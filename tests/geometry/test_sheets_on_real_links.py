@@ -9,12 +9,11 @@ import pytest
 
 from coneskin.geometry.fit.cone_fit import InfiniteCone, fit_cone
 from coneskin.geometry.fit.surface_samples import sample_surface
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, unroll
 from coneskin.geometry.mesh import Mesh, load_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.sector import unroll
 from coneskin.skin.sensor import Sensor
 from tests.support.paths import SHARED_DATA
 

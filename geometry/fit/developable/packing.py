@@ -16,11 +16,11 @@ import numpy as np
 from coneskin.core.arrays import Bools, Floats
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.developable import Developable
+from coneskin.geometry.fit.axis_plan import FittedSheet, deviations
 from coneskin.geometry.fit.bare_areas import BareArea, BareTally, hull_note
 from coneskin.geometry.fit.candidates import SampledLink, sample_link
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.fit_options import FitOptions, check_names
-from coneskin.geometry.fit.fitted_sheet import FittedSheet, deviations
 from coneskin.geometry.fit.profile import RadialProfile, Region
 from coneskin.geometry.fit.side import longest_run
 from coneskin.geometry.fit.surface_samples import SurfaceSamples
@@ -360,16 +360,7 @@ def find_sheets(
 ) -> LinkFit:
     """Find the sheets that cover most of a link: cones, or developables of another section where they cover more.
 
-    Args:
-        mesh: the link.
-        options: what is asked of the sheets; None for the values that ``FitOptions`` has by itself.
-        round_only: True for cones only.
-        progress: called with the name of each step.
-        named: options by their names, instead of those in ``options``.
-
-    Raises:
-        GeometryError: an option is out of range.
-        MeshError: no face of the mesh is visible from outside.
+    Arguments and errors are those of ``find_cones``; with ``round_only`` there are cones only.
     """
     check_names(named)
     options = replace(options or FitOptions(), **named)

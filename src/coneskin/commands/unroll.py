@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the sector of the cone; the exit code is 0."""
-    from coneskin.geometry.sector import unroll
+    from coneskin.geometry.frustum import unroll
 
     cone = given_cone(args)
     sector = unroll(cone)

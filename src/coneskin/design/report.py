@@ -11,8 +11,7 @@ from coneskin.skin.electronics import SENSE_GAIN, shunt_ohms
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import design_summary, sector_text, sheet_folder, small_active_area
-from .workshop.bill_of_materials import bill_of_materials
-from .workshop.build_figures import BuildFigures, section_head, table_head
+from .workshop.build_figures import BuildFigures, bill_of_materials, section_head, table_head
 from .workshop.build_guide import common_lines, sheet_lines
 
 if TYPE_CHECKING:
@@ -22,6 +21,15 @@ _TOOL_LIST = (
     "Tools: what cuts (a plotter with knives, or a scalpel and a cutting mat), caliper, steel rule, tape measure, try "
     "square, soft pencil, needle, hand roller of rubber, kitchen scales, multimeter, wire stripper, crimping tool for "
     "the contacts, flat pliers, side cutters, heat gun; a 3D printer where there is a jig."
+)
+_LAYER_HEAD = (
+    "layer",
+    "thickness [mm]",
+    "neutral surface above the link [mm]",
+    "radii [mm]",
+    "flat sector",
+    "seam gap if cut for the bare link [mm]",
+    "strain of inner, outer face",
 )
 
 
@@ -99,12 +107,8 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     ]
     if design.place.bends:
         rows.insert(0, ["side", f"{design.place.kind}: the radii are arc over wrap, the half angle that of the sector"])
-        rows.append(
-            [
-                "sharpest bend of the link",
-                f"radius {1e3 * min(side.radius1, side.radius2) / design.place.sharpest_bend:.2f} mm",
-            ]
-        )
+        sharpest = 1e3 * min(side.radius1, side.radius2) / design.place.sharpest_bend
+        rows.append(["sharpest bend of the link", f"radius {sharpest:.2f} mm"])
         rows.append(["layers beside their flat sector", f"{data['sector_error_mm']:.3f} mm at most"])
         if data["closing_gap_mm"] is not None:
             rows.append(["gap with which the bends close", f"{data['closing_gap_mm']:.4f} mm"])
@@ -137,31 +141,15 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
     yield f"Assembly: {stack.assembly}. The patterns differ in radius, but not in theta0."
     yield ""
     surfaces = {cut.name: cut.surface for cut in design.cuts}
-    table = []
+    rows = []
     for i, layer in enumerate(stack.layers):
         surface = surfaces[layer.name]
         inner, outer = stack.strain(design.place, i)
-        table.append(
-            [
-                layer.name,
-                f"{layer.thickness * 1e3:.2f}",
-                f"{stack.offset(i) * 1e3:.3f}",
-                f"{surface.radius1 * 1e3:.3f}, {surface.radius2 * 1e3:.3f}",
-                sector_text(surface),
-                f"{stack.ignored_gap(design.place, i) * 1e3:.2f}",
-                f"{inner:+.1%}, {outer:+.1%}",
-            ]
-        )
-    head = (
-        "layer",
-        "thickness [mm]",
-        "neutral surface above the link [mm]",
-        "radii [mm]",
-        "flat sector",
-        "seam gap if cut for the bare link [mm]",
-        "strain of inner, outer face",
-    )
-    yield from _table(head, table)
+        heights = f"{layer.thickness * 1e3:.2f}", f"{stack.offset(i) * 1e3:.3f}"
+        flat = f"{surface.radius1 * 1e3:.3f}, {surface.radius2 * 1e3:.3f}", sector_text(surface)
+        seam = f"{stack.ignored_gap(design.place, i) * 1e3:.2f}"
+        rows.append([layer.name, *heights, *flat, seam, f"{inner:+.1%}, {outer:+.1%}"])
+    yield from _table(_LAYER_HEAD, rows)
     parts = design.electronics
     radial, angular = (1e3 * amperes for amperes in design.drive_currents)
     full_scale = 1e3 * parts.current_full_scale

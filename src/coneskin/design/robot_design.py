@@ -33,7 +33,7 @@ from .sheets.sheet_design import DesignOptions, design_assembly
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-    from coneskin.geometry.fit.fitted_sheet import FittedSheet
+    from coneskin.geometry.fit.axis_plan import FittedSheet
 
 _WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another

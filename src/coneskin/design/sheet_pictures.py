@@ -12,8 +12,7 @@ from typing import Any
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.outline import Outline
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape, draw_hole, draw_shape, drawing_point
-from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.sector import unroll
+from coneskin.geometry.frustum import Frustum, unroll
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text

@@ -17,14 +17,13 @@ from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
 from coneskin.design.studio.workbench import Handles, RobotLinks, Wish, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, unroll
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.sector import unroll
 from coneskin.scene.reader import load_scene
 from coneskin.view.page_server import PageServer
 from tests.geometry.fit.test_seam_place import tube_with_wing

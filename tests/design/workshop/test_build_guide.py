@@ -10,8 +10,7 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
-from coneskin.design.workshop.bill_of_materials import bill_of_materials
-from coneskin.design.workshop.build_figures import LOOP, BuildFigures, measure_build
+from coneskin.design.workshop.build_figures import LOOP, BuildFigures, bill_of_materials, measure_build
 from coneskin.design.workshop.build_guide import common_lines, sheet_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable

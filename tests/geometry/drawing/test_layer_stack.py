@@ -13,9 +13,8 @@ from coneskin.geometry.drawing.layer_stack import (
     SheetLayer,
     snap_to_cylinder,
 )
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, unroll
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.sector import unroll
 
 from ..sheet_cases import SHEETS
 

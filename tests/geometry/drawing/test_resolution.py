@@ -8,9 +8,8 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.drawing.electrode_layout import forecast_resolution
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, Sector, roll_up, unroll
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.sector import Sector, roll_up, unroll
 from coneskin.skin.electronics import GivenElectronics
 
 mp.mp.dps = 40

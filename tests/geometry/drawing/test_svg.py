@@ -49,7 +49,7 @@ def test_combined_drawing_agrees_too():
 
 def test_size_is_in_mm_and_arcs_are_arcs():
     sheets = cut_sheets(lay_out_sheet(SHEETS["widening"]), PAPER_STACK)[:1]
-    text = to_svg(sheets, "a <title> & more", border=5e-3)
+    text = to_svg(sheets, "a <title> & more")
     root = ElementTree.fromstring(text)
     x0, y0, x1, y1 = sheets[0].bounds
     assert float(root.get("width").removesuffix("mm")) == pytest.approx((x1 - x0) * 1e3 + 10.0, abs=1e-6)

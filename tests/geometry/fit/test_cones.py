@@ -11,10 +11,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit, find_cones
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
+from coneskin.geometry.frustum import unroll
 from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
-from coneskin.geometry.sector import unroll
 from tests.support.paths import SHARED_DATA
 from tests.support.sweep import sweep
 

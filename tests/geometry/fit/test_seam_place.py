@@ -9,8 +9,8 @@ import pytest
 
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.fit.seam_place import place_seams
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from coneskin.core.arrays import Bools, Floats, Ints, frozen
+from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.drawing.electrode_layout import SheetLayout
 from coneskin.geometry.drawing.surface_shape import ShapeTab, SheetSide
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -205,6 +205,10 @@ class CableWay:
     hangs: bool = False
     on_sheet: bool = False
 
+    def __post_init__(self) -> None:
+        for array in (self.surface, self.points, self.normals, self.lengths):
+            array.setflags(write=False)
+
     @classmethod
     def over_seam(cls, apron: TabApron, side: SheetSide, own: SheetBody, wished: float) -> CableWay | None:
         """Return the way of wires that stand up from a seam, towards the farther end; None where it is too short."""
@@ -217,17 +221,8 @@ class CableWay:
         gone = np.linspace(0.0, length, max(9, math.ceil(length / _LATTICE_STEP)))
         at = np.stack([apron.u + ahead * gone, np.full(len(gone), apron.phi)], axis=1)
         points, normals = own.place.place(*at.T)
-        return cls(
-            side,
-            apron.u,
-            apron.phi,
-            frozen(at, (None, 2), "surface"),
-            frozen(points + own.thickness * normals, (None, 3), "points"),
-            frozen(normals, (None, 3), "normals"),
-            frozen(gone, (None,), "lengths"),
-            len(gone) // 2,
-            on_sheet=True,
-        )
+        points = points + own.thickness * normals
+        return cls(side, apron.u, apron.phi, at, points, normals, gone, len(gone) // 2, on_sheet=True)
 
     @property
     def connector_length(self) -> float:
@@ -459,16 +454,6 @@ class LinkSurface:
             tie = int(np.flatnonzero(may)[np.abs(gone[may] - 0.5 * gone[-1]).argmin()])
             at = np.stack([u[np.array(cells) // len(phi)], phi[np.array(cells) % len(phi)]], axis=1)
             first = at[0]
-            exit_at = (apron.u, float(first[1])) if side.startswith("end") else (float(first[0]), apron.phi)
-            return CableWay(
-                side,
-                exit_at[0],
-                exit_at[1] % math.tau,
-                frozen(at, (None, 2), "surface"),
-                frozen(points[cells], (None, 3), "points"),
-                frozen(normals[cells], (None, 3), "normals"),
-                frozen(gone, (None,), "lengths"),
-                tie,
-                hangs,
-            )
+            out_u, out_phi = (apron.u, float(first[1])) if side.startswith("end") else (float(first[0]), apron.phi)
+            return CableWay(side, out_u, out_phi % math.tau, at, points[cells], normals[cells], gone, tie, hangs)
         return None

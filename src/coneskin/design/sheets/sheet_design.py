@@ -38,8 +38,8 @@ from .assembly import PlacedSheet, assemble, sheet_gap
 from .cable_way import SheetBody
 
 if TYPE_CHECKING:
+    from coneskin.geometry.fit.axis_plan import FittedSheet
     from coneskin.geometry.fit.cones import LinkFit
-    from coneskin.geometry.fit.fitted_sheet import FittedSheet
     from coneskin.geometry.mesh import Mesh
 
     from .cable_way import Body, CableWay, TabApron

@@ -14,9 +14,8 @@ from coneskin.geometry.drawing.electrode_layout import (
     best_layout,
 )
 from coneskin.geometry.drawing.touch_marks import mark_parts
-from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum, Sector, unroll
 from coneskin.geometry.placed_frustum import PlacedFrustum
-from coneskin.geometry.sector import Sector, unroll
 from coneskin.scene.tables.sensor_keys import CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
 

@@ -17,7 +17,7 @@ from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.part_labels import PartLabel
 from coneskin.geometry.drawing.svg import to_svg
-from coneskin.geometry.sector import unroll
+from coneskin.geometry.frustum import unroll
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,8 +12,8 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.folder import write_design
 from coneskin.design.link_design import LinkMesh, find_link_sheets, load_link, room_for, with_seams
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
-from coneskin.geometry.fit.fitted_sheet import FittedSheet
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.urdf import urdf_joints, urdf_links

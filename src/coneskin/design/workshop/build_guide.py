@@ -13,8 +13,8 @@ from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.geometry.drawing.cut_sheet import TEST_HOLE, TEST_SQUARE
 from coneskin.geometry.drawing.touch_marks import marks_on_link
 
-from .bill_of_materials import ADHESIVE
 from .build_figures import (
+    ADHESIVE,
     ROLLING,
     SETTING,
     SPREAD,
