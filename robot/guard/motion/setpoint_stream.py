@@ -77,7 +77,7 @@ _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will 
 
 
 #: m/s of a surface that no skin covers, outward, where the scene allows that: the joints feel what it meets in 15 ms
-MAX_BARE_SPEED = 0.02
+MAX_BARE_SPEED = 0.015
 _MAX_PUSHED_SPEED = 0.008  # m/s; the same where a push moves the arm: it drives it on into what is met
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
