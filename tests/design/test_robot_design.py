@@ -58,7 +58,7 @@ def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tm
     assert [one.link for one in design.offered] == ["upper_arm_link", "forearm_link"]
     assert [one.wires for one in design.offered] == [4, 8]
     assert design.offered[1].total == pytest.approx(sum(one.area for one in design.offered))
-    assert (design.bought, sorted(path.name for path in out.iterdir() if path.is_dir())) == (1, ["upper_arm_link"])
+    assert (design.included, sorted(path.name for path in out.iterdir() if path.is_dir())) == (1, ["upper_arm_link"])
     rows = re.findall(r"^\| (\d+) \| (\w+) \|.*\| (yes|no) \|$", (out / "report.md").read_text(), re.MULTILINE)
     assert rows == [("4", "upper_arm_link", "yes"), ("8", "forearm_link", "no")]
     (sheet,) = json.loads((out / "upper_arm_link" / "design.json").read_text())["sheets"]
@@ -75,7 +75,7 @@ def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tm
         turned = Pose.from_rotation_vector((0.0, 0.0, float(turn))).apply_all(corners)
         assert not body.near(turned, 2e-3).any(), "the sheet ends before the way of the stop"
     assert any("end before what moves" in reason for reason in design.reasons)
-    with pytest.raises(GeometryError, match="2 sheets are possible, and 3 wires buy none: a sheet has 4"):
+    with pytest.raises(GeometryError, match="2 sheets are possible, 3 wires allow none: a sheet has 4"):
         design_robot(robot, tmp_path / "none", 3, pictures=False, max_sheets=1)
     assert not (tmp_path / "none").exists()
 

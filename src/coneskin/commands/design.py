@@ -3,7 +3,7 @@
 examples:
   coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
   coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
-  coneskin design arm.urdf --wires 24 -o skins         all links of a robot: the sheets that 24 wires buy
+  coneskin design arm.urdf --wires 24 -o skins         all links of a robot: the sheets that 24 wires allow
   coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
     add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create")
     add("--force", action="store_true", help="replace an earlier design in that folder")
-    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): the sheets that N wires buy")
+    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): the sheets that N wires allow")
     add("--json", action="store_true", help="print the design as JSON")
     add("--no-pictures", action="store_true", help="write the report without pictures")
     add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")
@@ -156,9 +156,9 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
         raise GeometryError("--wires is for a whole robot: name its FILE.urdf, without #LINK")
     design = design_robot(args.link, args.output, args.wires, **common)
     for count, one in enumerate(design.offered, 1):
-        bought = "" if count <= design.bought else ", not bought"
+        included = "" if count <= design.included else ", not included"
         area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"
-        print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{bought}")
+        print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{included}")
     print("\n".join(design.reasons))
     folder = shlex.quote(str(args.output))
     print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}; on another arm than a UR: --skin-only")

@@ -136,14 +136,14 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
         axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")
 
 
-def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], bought: int) -> None:
-    """Draw what touchable area [m2] each number of wires buys on a robot.
+def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], included: int) -> None:
+    """Draw what touchable area [m2] each number of wires allows on a robot.
 
     Args:
         file: to write.
         steps: wires and area.
         names: of the sheet that each brings.
-        bought: how many of them are bought.
+        included: how many of them are included.
     """
     from matplotlib.figure import Figure
 
@@ -152,7 +152,7 @@ def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[s
         figure = Figure(figsize=(8, 4.5), layout="constrained")
         axes = figure.add_subplot()
         axes.step(*zip(*points, strict=True), where="post", color="#2a7fb8")
-        axes.plot(*zip(*points[1 : bought + 1], strict=True), "o", color="#2a7fb8")
+        axes.plot(*zip(*points[1 : included + 1], strict=True), "o", color="#2a7fb8")
         for at, name in zip(points[1:], names, strict=True):
             axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
         axes.set(xlabel="wires", ylabel="touchable active area [cm2]")

@@ -1,4 +1,4 @@
-"""Design of the skin of a whole robot: the sheets of all its links that one budget of wires buys.
+"""Design of the skin of a whole robot: the sheets of all its links that one budget of wires allows.
 
 Each link is designed as one alone is, but clear of what moves beside it: over the whole range of a joint the link on
 its other side takes a space, before which sheets end, and in which no tab, tie or cable lies. Every sheet costs four
@@ -47,7 +47,7 @@ _TOUCH_GRID = (6, 24)  # places of an active area along and around
 
 
 class _Offer(NamedTuple):
-    """A sheet that can be bought, after those before it."""
+    """A sheet that wires may allow, after those before it."""
 
     link: str
     number: int  #: on that link
@@ -62,13 +62,13 @@ class RobotDesign:
     """The skin of a robot.
 
     Attributes:
-        offered: all sheets, in the order in which they are bought: the curve of touchable area against wires.
-        bought: how many of them the wires buy.
+        offered: all sheets, in the order in which they are included: the curve of touchable area against wires.
+        included: how many of them the wires allow.
         reasons: why a link carries none, or its sheets are shortened; one sentence each.
     """
 
     offered: tuple[_Offer, ...]
-    bought: int
+    included: int
     reasons: tuple[str, ...]
 
 
@@ -160,7 +160,7 @@ def design_robot(
     progress: Callable[[str], None] = lambda _: None,
     **search: Any,
 ) -> RobotDesign:
-    """Design all links of a URDF, and write those sheets that the wires buy, a folder for each link.
+    """Design all links of a URDF, and write those sheets that the wires allow, a folder for each link.
 
     Args:
         robot: a URDF or xacro file.
@@ -170,7 +170,7 @@ def design_robot(
 
     Raises:
         MeshError: the file cannot be read.
-        GeometryError: no link can carry a sheet, the wires buy none, or the folder is in use; nothing is written then.
+        GeometryError: no link can carry a sheet, wires allow none, or the folder is in use; nothing is written then.
     """
     options = options or DesignOptions()
     check_target(Path(folder), replace)
@@ -196,7 +196,7 @@ def design_robot(
         sheets = () if design.fit is None else design.fit.sheets
         cleared = [_clear(sheet, options.stack.thickness, beside[name]) for sheet in sheets]
         if any(one is not sheet for one, sheet in zip(cleared, sheets, strict=True)):
-            reasons.append(f"{name}: its sheets end before what moves beside it")
+            reasons.append(f"{name}: its sheets are shortened to clear the next link")
         found[name] = _assembled(design, [one for one in cleared if one is not None], options, beside[name])
         reasons += [f"{name}: {why}" for why in found[name].notes if why not in design.notes]
     progress("looking at what can be touched")
@@ -205,17 +205,17 @@ def design_robot(
     for area, active, name, number in sorted(sizes, key=lambda size: -size[0]):
         total = area + (offered[-1].total if offered else 0.0)
         offered.append(_Offer(name, number, active, area, _WIRES_PER_SHEET * (len(offered) + 1), total))
-    bought = len(offered) if wires is None else min(len(offered), wires // _WIRES_PER_SHEET)
-    if not bought:
+    included = len(offered) if wires is None else min(len(offered), wires // _WIRES_PER_SHEET)
+    if not included:
         raise GeometryError(
-            f"{robot}: {len(offered)} sheets are possible, and {wires} wires buy none: a sheet has {_WIRES_PER_SHEET}. "
+            f"{robot}: {len(offered)} sheets are possible, {wires} wires allow none: a sheet has {_WIRES_PER_SHEET}. "
             + "; ".join(reasons)
         )
     with _new_folder(Path(folder), replace) as draft:
-        result = RobotDesign(tuple(offered), bought, tuple(reasons))
+        result = RobotDesign(tuple(offered), included, tuple(reasons))
         written, sensors = [], 0
         for name, design in found.items():
-            wanted = {one.number for one in offered[:bought] if one.link == name}
+            wanted = {one.number for one in offered[:included] if one.link == name}
             if not wanted:
                 continue
             if len(wanted) < len(design.sheets):
@@ -307,14 +307,14 @@ def _poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str, Po
 
 def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot: str, pictures: bool) -> None:
     """Write what holds for the robot: the curve as table and picture, the reasons, and the list of its files."""
-    rows = [("wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "bought")]
+    rows = [("wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included")]
     for count, one in enumerate(design.offered, 1):
         areas = f"{1e4 * one.active:.1f}", f"{1e4 * one.area:.1f}", f"{1e4 * one.total:.1f}"
-        rows.append((str(one.wires), one.link, str(one.number), *areas, "yes" if count <= design.bought else "no"))
+        rows.append((str(one.wires), one.link, str(one.number), *areas, "yes" if count <= design.included else "no"))
     lines = [
         f"# Skin of {Path(robot).name}",
         "",
-        f"{design.bought} sheets, {_WIRES_PER_SHEET * design.bought} wires. Touchable is the active area times the "
+        f"{design.included} sheets, {_WIRES_PER_SHEET * design.included} wires. Touchable is the active area times the "
         f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
     ]
@@ -323,8 +323,8 @@ def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot:
         from .pictures import draw_curve
 
         names = [f"{one.link} {one.number}" for one in design.offered]
-        draw_curve(folder / "curve.png", [(one.wires, one.total) for one in design.offered], names, design.bought)
-        lines += ["", "![Touchable area against wires; what is bought is filled.](curve.png)"]
+        draw_curve(folder / "curve.png", [(one.wires, one.total) for one in design.offered], names, design.included)
+        lines += ["", "![Touchable area against wires; what is included is filled.](curve.png)"]
     lines += ["", *(f"* {reason}" for reason in design.reasons)]
     lines += [f"* [{name}]({name}/report.md): how its sheets are built" for name in links]
     lines += [
