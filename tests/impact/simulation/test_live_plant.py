@@ -97,6 +97,16 @@ def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(tmp_path: Pat
     pytest.fail("this computer has held the physics up five times of five")
 
 
+@pytest.mark.long
+def test_what_the_bodies_bore_is_told_after_the_controller_has_ended() -> None:
+    """A controller that gives the physics up, because a busy computer held it up, takes no figure along."""
+    with opened() as (_, plant, controller):
+        controller.__exit__(None, None, None)
+        for _ in range(2):
+            outcome, began = plant.outcome()
+            assert (outcome.peak, math.isnan(began)) == (0.0, True)
+
+
 def judge_the_stop(live: Live, recording: Path, events: list[GuardEvent], rest: dict[str, Any]) -> None:
     scene, plant, _ = live
     assert rest["plant_lost"] == ""

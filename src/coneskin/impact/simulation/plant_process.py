@@ -31,7 +31,7 @@ _RELAXED_CYCLES = 500  # without a press, after which the foam of a skin has com
 
 
 def main(arguments: list[str]) -> int:
-    """Take the channels and the scene, and follow the controller until it ends, or the program does."""
+    """Take the channels and the scene, follow the controller until it ends, and answer the program until it does."""
     _, (program, controller, skin) = inherit(arguments)  # it ends with the program at once
     from coneskin.robot.sim.motion.arm import CYCLE
     from coneskin.robot.sim.motion.plant import PlantLost, decode_targets, encode_state
@@ -59,8 +59,10 @@ def main(arguments: list[str]) -> int:
     gc.freeze()
     meter, recorder, touches = ImpactMeter(), TruthRecorder(_TRUTH_PERIOD), TouchRecorder()
     quiet = _RELAXED_CYCLES  # cycles since something pressed
-    while not controller.closed and not program.closed:
-        ready = wait_readable([program, controller], _POLL_TIMEOUT)
+    while not program.closed:
+        if controller.closed:
+            skin.close()
+        ready = wait_readable([program] if controller.closed else [program, controller], _POLL_TIMEOUT)
         for message in controller.receive():
             try:
                 state = plant.update(*decode_targets(message))
