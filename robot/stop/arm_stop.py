@@ -108,10 +108,11 @@ class ArmStop:
         stop = self._monitor
         if stop is None or stop.course.standing_at is not None:
             return False, False
-        before = stop.course.slowed_at
+        before = stop.course
         stop.sample(state.time, state.speed, measured_at)
-        slows = before is None and stop.course.slowed_at is not None and not stop.use.rippled
-        if stop.course.standing_at is None:
+        after = stop.course  # of another name: a compiler takes the old one to be as it was
+        slows = before.slowed_at is None and after.slowed_at is not None and not stop.use.rippled
+        if after.standing_at is None:
             return slows, False
         self.watch.begin(state.time, math.inf)
         return slows, True
