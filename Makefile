@@ -65,7 +65,8 @@ $(VENV)/docs.stamp: extras = docs
 # uv takes a third of pip's time; where it cannot be had, or its index not be reached, pip does it
 $(VENV)/%.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	@echo "installing coneskin[$(extras)]"
-	@export UV_DEFAULT_INDEX="$$($(BIN)/python -m pip config get global.index-url 2>/dev/null)"; \
+	@index="$${UV_DEFAULT_INDEX:-$${PIP_INDEX_URL:-$$($(BIN)/python -m pip config get global.index-url 2>/dev/null)}}"; \
+		[ -z "$$index" ] || export UV_DEFAULT_INDEX="$$index"; \
 		$(BIN)/python -m pip install -q uv && $(BIN)/python -m uv pip install -q -p $(BIN)/python -e '.[$(extras)]' || \
 		$(BIN)/python -m pip install -q -e '.[$(extras)]'
 	@touch $@ $(more)

@@ -66,16 +66,20 @@ def urdf_links(
         arguments: of a xacro file.
 
     Raises:
-        MeshError: no such file, or not a URDF.
+        MeshError: no such file, not a URDF, or the name of a link is taken or no name of a folder.
         MissingExtra: xacrodoc is not installed, and the file is a xacro file.
     """
     robot = _robot(Path(path), packages, arguments)
-    return tuple(link.get("name", "") for link in robot.iter("link") if link.find(".//mesh") is not None)
+    names = tuple(link.get("name", "") for link in robot.iter("link") if link.find(".//mesh") is not None)
+    for name in names:
+        if not name.strip(".") or Path(name).name != name or names.count(name) > 1:  # each becomes a folder
+            raise MeshError(f"{path}: the name of a link must be its own, and hold no / or .., got {name!r}")
+    return names
 
 
 @dataclass(frozen=True, slots=True)
 class UrdfJoint:
-    """A joint that turns or is fixed: x_parent = origin R(axis, angle) x_child, from lower to upper angle [rad]."""
+    """A joint: x_parent = origin R(axis, angle) x_child, from lower to upper angle [rad]; one that slides is fixed."""
 
     parent: str
     child: str
@@ -90,24 +94,27 @@ def urdf_joints(
     packages: Mapping[str, str | Path] | None = None,
     arguments: Mapping[str, str] | None = None,
 ) -> tuple[UrdfJoint, ...]:
-    """Return the joints of a URDF that turn or are fixed; arguments and errors as those of ``urdf_links``."""
+    """Return the joints of a URDF, one that slides where it is nearest to 0; arguments and errors of ``urdf_links``."""
     joints = []
     for joint in _robot(Path(path), packages, arguments).iter("joint"):
         kind, parent, child = joint.get("type", ""), joint.find("parent"), joint.find("child")
-        if parent is None or child is None or kind not in ("revolute", "continuous", "fixed"):
+        if parent is None or child is None or kind not in ("revolute", "continuous", "fixed", "prismatic"):
             continue
         name = f"{path}: joint {joint.get('name')}"
         axis, limit = joint.find("axis"), joint.find("limit")
         way = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"{name}: axis")
         lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
-        if kind == "revolute" and limit is not None:
+        if kind in ("revolute", "prismatic") and limit is not None:
             lower, upper, _ = _numbers(f"{limit.get('lower', 0)} {limit.get('upper', 0)} 0", f"{name}: limit")
-        if upper - lower > math.tau:
-            lower, upper = -math.pi, math.pi
         length = math.hypot(*way) or 1.0
         unit = way[0] / length, way[1] / length, way[2] / length
-        links = parent.get("link", ""), child.get("link", "")
-        joints.append(UrdfJoint(*links, _origin(joint, f"joint {joint.get('name')}", path), unit, lower, upper))
+        origin = _origin(joint, f"joint {joint.get('name')}", path)
+        if kind == "prismatic":
+            slid = min(max(0.0, lower), upper)
+            origin, lower, upper = origin @ Pose(translation=(slid * unit[0], slid * unit[1], slid * unit[2])), 0.0, 0.0
+        elif upper - lower > math.tau:
+            lower, upper = -math.pi, math.pi
+        joints.append(UrdfJoint(parent.get("link", ""), child.get("link", ""), origin, unit, lower, upper))
     return tuple(joints)
 
 

@@ -74,7 +74,7 @@ def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tm
     for turn in np.radians(np.arange(0.0, 360.0, 3.0)):
         turned = Pose.from_rotation_vector((0.0, 0.0, float(turn))).apply_all(corners)
         assert not body.near(turned, 2e-3).any(), "the sheet ends before the way of the stop"
-    assert any("end before what moves" in reason for reason in design.reasons)
+    assert any("shortened to clear the next link" in reason for reason in design.reasons)
     with pytest.raises(GeometryError, match="2 sheets are possible, 3 wires allow none: a sheet has 4"):
         design_robot(robot, tmp_path / "none", 3, pictures=False, max_sheets=1)
     assert not (tmp_path / "none").exists()

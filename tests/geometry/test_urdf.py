@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.core.errors import MeshError
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.urdf import load_urdf_link, urdf_links
+from coneskin.geometry.urdf import load_urdf_link, urdf_joints, urdf_links
 
 from .synthetic import frustum
 from .test_mesh import write_dae, write_stl
@@ -130,3 +130,23 @@ def test_what_is_no_urdf(tmp_path: Path, text: str, words: str) -> None:
         load_urdf_link(tmp_path / "none.urdf", "arm")
     with pytest.raises(MeshError, match="'visual' or 'collision', got 'both'"):
         load_urdf_link(file, "arm", "both")
+
+
+def test_a_joint_that_slides_stays_where_it_is_nearest_to_zero(tmp_path: Path) -> None:
+    file = tmp_path / "slide.urdf"
+    file.write_text(
+        """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="prismatic"><parent link="a"/>
+        <child link="b"/><origin xyz="0 0 0.3"/><axis xyz="0 0 2"/><limit lower="0.1" upper="0.5"/></joint></robot>"""
+    )
+    (joint,) = urdf_joints(file)
+    assert joint.origin.translation == pytest.approx((0.0, 0.0, 0.4))
+    assert (joint.lower, joint.upper) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("names", [("../a", "b"), ("/a", "b"), ("..", "b"), ("a", "a"), ("", "b")])
+def test_a_link_whose_name_is_no_folder_of_its_own_is_refused(tmp_path: Path, names: tuple[str, str]) -> None:
+    file = tmp_path / "r.urdf"
+    link = '<link name="{}"><visual><geometry><mesh filename="a.stl"/></geometry></visual></link>'
+    file.write_text(f"<robot name='r'>{''.join(map(link.format, names))}</robot>")
+    with pytest.raises(MeshError, match="the name of a link must be its own"):
+        urdf_links(file)

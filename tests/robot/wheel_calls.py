@@ -237,6 +237,7 @@ def inputs_and_outputs(host: str) -> dict[str, Any]:
     io.setSpeedSlider(0.0)
     out["none"] = _reach(receive, 0.0)
     control.stopJ(10.0)
+    _until(control.isSteady)
     io.setSpeedSlider(1.0)  # not under a motion: that would be a protective stop
     _until(lambda: receive.getTargetSpeedFraction() == 1.0)
     control.moveJ(home, 1.0, 10.0, True)

@@ -153,6 +153,9 @@ _ZERO_LIMIT: Final = 0.012  # of full scale, that the zero may be off; 0.8 mV be
 _ZERO_REST: Final = 1  # count, by which it may be off and is not followed: untouched readings are cut off at 0
 _ZERO_STEP: Final = 1.0  # s, in which it is followed by a count
 _ZERO_TIME: Final = 0.5  # s of a look at one that is known: hum of 3 Hz and more goes up and down in it,
+_ZERO_TURN: Final = (
+    0.618  # of the time between two of its frames, by which the next is longer: mains stand still in none
+)
 _ZERO_SPREAD: Final = 6.0  # counts of the middle 80 %, more than the noise that most boards have
 
 
@@ -194,10 +197,10 @@ class UntouchedZero:
         """
         self._waited += period
         self._since += period
-        if self.known and self._since < _ZERO_TIME / CURRENT_BLOCK:
+        seen = self._seen
+        if self.known and self._since < (0.5 + _ZERO_TURN * len(seen) % 1.0) * _ZERO_TIME / CURRENT_BLOCK:
             return False
         self._since = 0.0
-        seen = self._seen
         seen.append(frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide)
         if len(seen) < CURRENT_BLOCK:
             return False

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError
-from coneskin.core.text import printable
+from coneskin.core.text import printable, read_json
 from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
 from coneskin.geometry.drawing.nesting import nest_on_beds
@@ -85,7 +85,12 @@ def check_target(target: Path, replace: bool = False) -> None:
             raise GeometryError(
                 f"{target} exists already: choose another folder, or replace the design there (--force, replace=True)"
             )
-        if not (target / DESIGN_FILE).is_file():
+        try:
+            data = read_json((target / DESIGN_FILE).read_bytes())
+            ours = isinstance(data["files"], list) and isinstance(data.get("sheets", data.get("links")), list)
+        except (OSError, ValueError, TypeError, KeyError):
+            ours = False
+        if not ours:
             raise GeometryError(f"{target} is not a design (no {DESIGN_FILE} in it), so it is not replaced")
 
 
@@ -263,7 +268,7 @@ def write_design(
         draft.write(Path("materials.csv"), table.getvalue())
         data["files"] = [*draft.files, DESIGN_FILE]
         draft.write(Path(DESIGN_FILE), json.dumps(data, indent=2) + "\n")
-        progress(f"{len(draft.files)} files in {folder}")
+        progress(f"{len(draft.files)} files")
     return data
 
 

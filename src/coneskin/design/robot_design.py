@@ -329,8 +329,8 @@ def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot:
     lines += [f"* [{name}]({name}/report.md): how its sheets are built" for name in links]
     lines += [
         "* Sheets, tabs, ties and cables are clear of the links beside theirs, over the whole range of the joint "
-        "between. Not looked at: links two joints away, the thickness of another link's skin, and how a cable passes a "
-        "joint.",
+        "between. Not looked at: links two joints away, joints that slide, the thickness of another link's skin, and "
+        "how a cable passes a joint.",
     ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())

@@ -216,7 +216,9 @@ def test_links_of_a_robot_stand_where_its_joints_are_at_zero(tmp_path: Path) -> 
     assert poses["first"] == Pose()
     assert poses["second"].apply((0.0, 0.0, 0.1)) == pytest.approx((0.1, 0.0, 0.2))
     assert links.open("second") is links.open("second")
-    facts = robot_facts([(name, links.opened[name].designs if name in links.opened else None) for name in links.names])
+    facts = robot_facts(
+        [(name, links.opened[name].designs if name in links.opened else "not opened") for name in links.names]
+    )
     assert "first</td><td style='padding-right:8px'>not opened" in facts
     assert "second</td><td style='padding-right:8px'>0<" in facts
 
@@ -300,3 +302,35 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
         page._take_upload()
         assert page._bench.link.name == "quick"
         assert "quick.stl: 1 sheet" in page._said.content
+
+
+def test_two_sheets_over_one_another_leave_no_room_for_a_third(bench: Workbench) -> None:
+    bench.handle(0, Handles(along=0.05))
+    bench.add(0)
+    bench.handle(1, Handles())
+    with pytest.raises(GeometryError, match="surface 1 is covered all along"):
+        bench.add(0)
+
+
+def test_what_was_sought_for_one_link_is_not_taken_for_another(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+        page = StudioPage(server, bench, tmp_path / "skin", False, lambda _: bench)
+        other = Workbench(bench.link, bench.wish)
+        page._change(lambda bench: bench.delete(0), of=other)
+        assert page._bench is bench
+        assert len(bench.wish.handles) == 1
+
+
+def test_a_folder_of_others_is_not_replaced_by_a_second_press(bench: Workbench, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="viser is not installed: no page is served")
+    own = tmp_path / "skin" / "design.json"
+    own.parent.mkdir()
+    own.write_text('{"name": "mine"}')
+    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+        page = StudioPage(server, bench, own.parent, False, lambda _: bench)
+        page._written()
+        assert "press again" in page._told.content
+        page._written()
+        assert "is not a design" in page._told.content
+        assert own.read_text() == '{"name": "mine"}'

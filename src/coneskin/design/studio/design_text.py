@@ -197,13 +197,13 @@ def design_facts(designs: Sequence[SheetDesign]) -> str:
     return f'<div id="coneskin-facts" style="font-size:13px;margin:4px 10px">{count}{"".join(parts)}</div>'
 
 
-def robot_facts(links: Sequence[tuple[str, Sequence[SheetDesign] | None]]) -> str:
-    """Return sheets, wires and active area of each link of a robot; None where a link was not opened yet."""
+def robot_facts(links: Sequence[tuple[str, Sequence[SheetDesign] | str]]) -> str:
+    """Return sheets, wires and active area of each link of a robot, or why there is nothing to say of it."""
     rows = [("link", "sheets", "wires", "active [cm2]")]
     counts, area = 0, 0.0
     for name, designs in links:
-        if designs is None:
-            rows.append((name, "not opened", "", ""))
+        if isinstance(designs, str):
+            rows.append((name, designs, "", ""))
             continue
         active = sum(design.layout.active.area(design.place.frustum) for design in designs)
         counts, area = counts + len(designs), area + active

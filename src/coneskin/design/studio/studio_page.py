@@ -38,6 +38,7 @@ from .workbench import Handles, RobotLinks, Wish, Workbench
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
+    from coneskin.design.sheets.sheet_design import SheetDesign
 
 #: for the head of the page: a file that is dropped anywhere goes the way of viser's button, which takes one from its
 #: dialogue alone; a browser would leave the page otherwise, and show the file
@@ -76,6 +77,7 @@ _SHOWN_FIRST = "lower conductive"  # layer of the flat drawing that says most
 _HANDLE_STEP = 0.5  # mm and deg of the handles
 _SHORTEST = 10.0  # mm along the axis
 _MOST_WIRES = 40
+_LINK_SENSORS = _MOST_WIRES // 4  # numbers of sensors that are kept for each link of a robot
 _ALL_LINKS = "the whole robot"
 _EVEN, _FREE = "all areas alike", "open space above it"
 
@@ -166,11 +168,16 @@ class StudioPage:
 
     def _draw_robot(self) -> None:
         """Draw all links of a robot, with the sheets of those that were opened."""
-        robot, rows = self._robot, []
+        robot = self._robot
+        rows: list[tuple[str, Sequence[SheetDesign] | str]] = []
         assert robot is not None
         corners = []
         for name, pose in robot.poses().items():
-            mesh = robot.link(name).mesh
+            try:
+                mesh = robot.link(name).mesh
+            except ConeSkinError as exc:
+                rows.append((name, str(exc)))
+                continue
             corners.append(pose.apply_all(mesh.vertices))
             self._add_mesh(f"/robot/{name}", corners[-1], mesh.faces, _LINK_COLOR)
             bench = robot.opened.get(name)
@@ -178,8 +185,8 @@ class StudioPage:
                 triangles = pose.apply_all(design.outer_triangles().reshape(-1, 3))
                 faces = np.arange(len(triangles)).reshape(-1, 3)
                 self._add_mesh(f"/robot/{name}/{design.name}", triangles, faces, _SHEET_COLOR)
-            rows.append((name, None if bench is None else bench.designs))
-        self._server.look_from(*first_view((), None, np.concatenate(corners)))
+            rows.append((name, "not opened" if bench is None else bench.designs))
+        self._server.look_from(*first_view((), None, np.concatenate(corners or [np.eye(3)])))
         self._legend.content, self._flat.content, self._warnings.content = "", "", ""
         self._facts.content = robot_facts(rows)
 
@@ -282,10 +289,10 @@ class StudioPage:
             slider.on_update(lambda _event, name=name: moved(name))
         gui.add_button("delete").on_click(lambda _event: self._change(lambda bench: bench.delete(number)))
 
-    def _change(self, change: Callable[[Workbench], None]) -> None:
-        """Change the sheets by a button, and make their handles anew."""
+    def _change(self, change: Callable[[Workbench], None], of: Workbench | None = None) -> None:
+        """Change the sheets by a button, and make their handles anew; nothing where another link is open by then."""
         with self._lock:
-            if self._bench is None:
+            if self._bench is None or (of is not None and self._bench is not of):
                 return
             self._held = None
             try:
@@ -311,7 +318,7 @@ class StudioPage:
         except ConeSkinError as exc:
             self._say(str(exc))
             return
-        self._change(lambda bench: bench.change(wish))
+        self._change(lambda bench: bench.change(wish), of=bench)
         self._say(f"found {_count_of(wish.handles)}")
 
     def _draw(self) -> None:
@@ -387,7 +394,8 @@ class StudioPage:
                 path.write_bytes(file.content)
                 found = next(iter(load_link(str(path))))
             stem = "".join(letter for letter in Path(file.name).stem if letter.isalnum() or letter in "-_ ")[:40]
-            bench = self._load(LinkMesh(stem or "link", found.mesh, found.frame, found.notes))
+            frame = found.frame.replace(path.name, file.name)
+            bench = self._load(LinkMesh(stem or "link", found.mesh, frame, found.notes))
         except (ConeSkinError, OSError) as exc:
             self._say(f"{file.name}: {str(exc).removeprefix(f'{path}: ')}")
             return
@@ -395,6 +403,7 @@ class StudioPage:
             if self._upload.value is not file:  # another was dropped meanwhile, and is the one that is wanted
                 return
             self._bench, self._held = bench, None
+            self._replaceable.clear()
             self._stand()
         self._say(f"{file.name}: {_count_of(bench.designs)}")
 
@@ -417,7 +426,10 @@ class StudioPage:
         bench = self._bench
         if bench is None:
             return
-        folder = self._folder if self._robot is None else self._folder / bench.link.name
+        folder, first = self._folder, 0
+        if self._robot is not None:
+            folder, known = folder / bench.link.name, self._robot.names
+            first = _LINK_SENSORS * known.index(bench.link.name) if bench.link.name in known else 0
         if folder.exists() and not self._overwrite and folder not in self._replaceable:
             self._replaceable.add(folder)
             self._tell(f"{folder} exists already: press again to replace the design in it")
@@ -426,9 +438,11 @@ class StudioPage:
         self._tell(f"writing {folder} ... (drawings and pictures take some seconds)")
         try:
             with self._lock:
-                files = bench.write(folder, overwrite=True)
+                files = bench.write(folder, overwrite=True, first_sensor=first)
         except ConeSkinError as exc:
             self._tell(str(exc))
+        except OSError as exc:  # a full disk
+            self._tell(f"{folder} cannot be written: {exc.strerror or exc}")
         else:
             self._replaceable.add(folder)
             next_step = f"coneskin init {shlex.quote(str(folder))} --simulated"

@@ -188,8 +188,8 @@ class Workbench:
             GeometryError: the side is covered all along.
         """
         found = self.wish.fit.sheets[side].frustum
-        taken = sorted((one.along, one.length) for one in self.wish.handles if one.side == side)
-        ends = [(along, found.height if length is None else along + length) for along, length in taken]
+        taken = [one for one in self.wish.handles if one.side == side]
+        ends = sorted((one.along, found.height if one.length is None else one.along + one.length) for one in taken)
         gap = self.options.sheet_gap
         starts = [0.0, *(end + gap for _, end in ends)]
         stops = [*(start - gap for start, _ in ends), found.height]
@@ -260,13 +260,16 @@ class Workbench:
                 )
         return found or ([fit.reason] if fit.reason else [])
 
-    def write(self, folder: Path, overwrite: bool = False, pictures: bool = True) -> Sequence[str]:
+    def write(
+        self, folder: Path, overwrite: bool = False, pictures: bool = True, first_sensor: int = 0
+    ) -> Sequence[str]:
         """Write the folder that ``coneskin design`` writes.
 
         Args:
             folder: to write.
             overwrite: an earlier design in it may be replaced.
             pictures: draw them too.
+            first_sensor: number of the first sensor.
 
         Returns:
             the files of the design, as paths in the folder.
@@ -288,6 +291,7 @@ class Workbench:
             notes=(*self.link.notes, *self.seam_notes(), *self.left_out),
             pictures=pictures,
             replace=overwrite,
+            first_sensor=first_sensor,
         )
         return [str(name) for name in data["files"]]
 
