@@ -240,7 +240,7 @@ def inputs_and_outputs(host: str) -> dict[str, Any]:
     _until(control.isSteady)
     io.setSpeedSlider(1.0)  # not under a motion: that would be a protective stop
     _until(lambda: receive.getTargetSpeedFraction() == 1.0)
-    control.moveJ(home, 1.0, 10.0, True)
+    control.moveJ([home[0] + 3.0, *home[1:]], 1.0, 10.0, True)  # home may be too near to reach that speed
     out["again"] = _reach(receive, 1.0)
     control.stopJ(10.0)
     control.moveJ(home, 3.0, 20.0)
