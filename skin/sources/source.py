@@ -16,7 +16,6 @@ from types import TracebackType
 from typing import Any, Protocol, Self, runtime_checkable
 
 from coneskin.core.errors import ConeSkinError, SensorError, SkinConnectionError, SkinTimeout
-from coneskin.skin.wire import FrameDecoder
 
 
 class Openable(Protocol):
@@ -123,6 +122,8 @@ class _FrameBoundary:
     __slots__ = ("_decoder", "_rest")
 
     def __init__(self) -> None:
+        from coneskin.skin.wire import FrameDecoder  # not where a scene is only read
+
         self._decoder = FrameDecoder()
         self._rest = b""
 

@@ -115,7 +115,8 @@ def test_the_sheet_goes_where_touches_count() -> None:
     places = TILTED.apply_all(np.array([[0.0, 0.0, 0.06], [0.0, 0.0, 0.21]]))
     fit = cones(mesh, max_sheets=1, weights=TouchWeights(places, np.array([0.1, 1.0]), "a map"))
     (sheet,) = fit.sheets
-    assert fit.weights == "a map"
+    assert fit.touch_weights is not None
+    assert fit.touch_weights.name == "a map"
     assert sheet.frustum.radius1 == pytest.approx(0.04, abs=1e-4)
     assert sheet.frustum.height > 0.09
     assert sheet.touch_share > 0.6 > 0.5 > sheet.area_share
@@ -157,7 +158,8 @@ def test_exposure_prefers_the_open_side() -> None:
     shifted = moved(tube, Pose.from_xyz_rpy((0.4, 0.0, 0.0), (0.0, 0.0, 0.0)))
     mesh = placed(joined(tube, slab, shifted))
     fit = find_cones(mesh, max_sheets=1, exposure=True)
-    assert fit.weights == "exposure"
+    assert fit.touch_weights is not None
+    assert fit.touch_weights.name == "exposure"
     place = TILTED.inverse().apply(fit.sheets[0].placed.link_frustum.translation)
     assert place[0] == pytest.approx(0.4, abs=1e-3)
 

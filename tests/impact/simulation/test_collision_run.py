@@ -91,7 +91,7 @@ def test_moving_away_takes_the_force_off_that_a_stop_leaves() -> None:
     stop, retreat, comply = (collide(scene_of(kind)).outcome for kind in ("stop", "retreat", "comply"))
     assert stop.peak == pytest.approx(retreat.peak, rel=1e-6)  # until it stands, all brake alike
     assert retreat.clamp < 0.8 * stop.clamp
-    assert comply.clamp < 0.7 * stop.clamp  # as fast as the joints feel a push: slower than a retreat from a hand
+    assert comply.clamp < stop.clamp - 14.0  # it rests once 15 N are gone, which what stands behind may carry
 
 
 @pytest.mark.long

@@ -18,7 +18,7 @@ from coneskin.robot.guard import arm_supervisor
 from coneskin.robot.guard.activation import Activation, ActivationStep
 from coneskin.robot.guard.arm_supervisor import ArmSupervisor
 from coneskin.robot.guard.core import GuardCore
-from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
+from coneskin.robot.guard.motion.setpoint_stream import MotionStream
 from coneskin.robot.guard.phase import Act, Phase
 from coneskin.robot.guard.signals.journal import EventName, emit
 from coneskin.robot.stop.standstill import StandstillWatch
@@ -111,7 +111,7 @@ def _at_once(was: Any) -> Any:
 
 
 def _inward(was: Any) -> Any:
-    def stream(self: Any, motion: Any, *args: Any) -> Any:
+    def stream(self: Any, motion: Any, *args: Any) -> None:
         update = motion.update
 
         def turned(here: Any, contacts: Any) -> Any:
@@ -119,7 +119,7 @@ def _inward(was: Any) -> Any:
             return step._replace(qd=tuple(-v for v in step.qd)) if hasattr(step, "_replace") else _turn(step)
 
         motion.update = turned
-        return was(self, motion, *args)
+        was(self, motion, *args)
 
     return stream
 
@@ -163,7 +163,7 @@ BREAKS: dict[str, Break] = {
         *("an arm that the controller holds is moved", ("safety wrong", "mend safety")),
     ),
     "contact": Break(
-        *(ReactionPlanner, "_stream", _inward, "a retreat goes inward", _TOUCH),
+        *(MotionStream, "__init__", _inward, "a retreat goes inward", _TOUCH),
         Settings("retreat"),
     ),
     "latches": Break(

@@ -153,7 +153,7 @@ class CollisionRun:
         self._limit = _ForceLimit(model)
         self._core = build_core(scene) if protection == "guard" else None
         sensors = [item.sensor for item in scene.sensors]
-        self._device = PressedSkin(sensors, seed=seed)
+        self._device = PressedSkin(sensors, seed=seed, model="ladder")
         self._packets = self._device.packets()
         self._companions = CompanionProcesses()
         self._commands: deque[tuple[int, object]] = deque()
