@@ -7,7 +7,7 @@ evaluated. Expand only what you trust.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -116,6 +116,19 @@ def urdf_joints(
             lower, upper = -math.pi, math.pi
         joints.append(UrdfJoint(parent.get("link", ""), child.get("link", ""), origin, unit, lower, upper))
     return tuple(joints)
+
+
+def link_poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str, Pose]:
+    """Return the pose of each link in the frame of the root of a robot whose joints are at some angles [rad]."""
+    children = {joint.child for joint in joints}
+    poses = {joint.parent: Pose() for joint in joints if joint.parent not in children}
+    left = list(zip(joints, angles, strict=True))
+    while reached := [pair for pair in left if pair[0].parent in poses]:
+        for joint, angle in reached:
+            turn = Pose.from_rotation_vector([angle * x for x in joint.axis])
+            poses[joint.child] = poses[joint.parent] @ joint.origin @ turn
+        left = [pair for pair in left if pair[0].child not in poses]
+    return poses
 
 
 def load_urdf_link(

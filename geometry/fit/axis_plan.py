@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -368,6 +368,17 @@ class FittedSheet:
     def frustum(self) -> Frustum:
         """Side of the sheet."""
         return self.placed.frustum
+
+    def covering(self, part: PlacedFrustum) -> FittedSheet:
+        """Return the sheet on a part of its side; its deviation stays that of the whole."""
+        length, area = part.frustum.height / self.frustum.height, part.frustum.area / self.frustum.area
+        return replace(
+            self,
+            placed=part,
+            length_share=length * self.length_share,
+            area_share=area * self.area_share,
+            touch_share=area * self.touch_share,
+        )
 
 
 def deviations(miss: Floats, hole: Bools) -> dict[str, float]:

@@ -24,7 +24,7 @@ from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.urdf import UrdfJoint, urdf_joints, urdf_links
+from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_links
 
 from .folder import DESIGN_FILE, FileOptions, _new_folder, check_target
 from .link_design import LinkDesign, _fit_link, room_for
@@ -253,10 +253,7 @@ def _clear(fit: FittedSheet, thickness: float, beside: Sequence[_SweptLink]) -> 
     if end == first or u[end - 1] - u[first] < _LEAST_SLANT:
         return None
     part = fit.placed.part(float(u[first]), float(u[end - 1]), 0.0, side.wrap)
-    share = part.frustum.area / side.area
-    return dataclasses.replace(
-        fit, placed=part, area_share=share * fit.area_share, length_share=share * fit.length_share
-    )
+    return fit.covering(part)
 
 
 def _touchable(
@@ -268,7 +265,7 @@ def _touchable(
     chance = np.random.default_rng(1)
     free: dict[tuple[str, int], list[float]] = {}
     for _ in range(_POSE_COUNT):
-        poses = _poses(joints, [float(chance.uniform(joint.lower, joint.upper)) for joint in joints])
+        poses = link_poses(joints, [float(chance.uniform(joint.lower, joint.upper)) for joint in joints])
         shown = [mesh.moved(poses.get(name, Pose())) for name, mesh in meshes.items()]
         starts = np.cumsum([0, *(len(mesh.vertices) for mesh in shown)])
         faces = np.concatenate([mesh.faces + start for mesh, start in zip(shown, starts, strict=False)])
@@ -290,19 +287,6 @@ def _touchable(
         active = layout.active.area(layout.sheet)
         sizes.append((active * math.fsum(shares) / len(shares), active, name, number))
     return sizes
-
-
-def _poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str, Pose]:
-    """Return the pose of each link in the frame of the root of a robot whose joints are at some angles [rad]."""
-    children = {joint.child for joint in joints}
-    poses = {joint.parent: Pose() for joint in joints if joint.parent not in children}
-    left = list(zip(joints, angles, strict=True))
-    while reached := [pair for pair in left if pair[0].parent in poses]:
-        for joint, angle in reached:
-            turn = Pose.from_rotation_vector([angle * x for x in joint.axis])
-            poses[joint.child] = poses[joint.parent] @ joint.origin @ turn
-        left = [pair for pair in left if pair[0].child not in poses]
-    return poses
 
 
 def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot: str, pictures: bool) -> None:

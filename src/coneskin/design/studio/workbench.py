@@ -16,7 +16,7 @@ from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.urdf import urdf_joints, urdf_links
+from coneskin.geometry.urdf import link_poses, urdf_joints, urdf_links
 
 _MIN_LENGTH = 0.010  # m; a sheet cannot be shorter than this
 _TIGHT_SHARE = 0.9  # of the tolerance, from which on a deviation is worth a warning
@@ -122,15 +122,7 @@ class Wish:
         side = self.fit.sheets[handles.side]
         if handles == Handles(handles.side):
             return side
-        placed = _adjusted(side.placed, handles)
-        length, area = placed.frustum.height / side.frustum.height, placed.frustum.area / side.frustum.area
-        return replace(
-            side,
-            placed=placed,
-            length_share=length * side.length_share,
-            area_share=area * side.area_share,
-            touch_share=area * side.touch_share,
-        )
+        return side.covering(_adjusted(side.placed, handles))
 
 
 class Workbench:
@@ -337,18 +329,5 @@ class RobotLinks:
     def poses(self) -> dict[str, Pose]:
         """Return where the links are when each joint is as near to 0 as it can be."""
         joints = urdf_joints(self._robot, **self._urdf)
-        turned = {
-            joint.child: (joint.parent, joint.origin @ Pose.from_rotation_vector([angle * x for x in joint.axis]))
-            for joint in joints
-            for angle in [min(max(0.0, joint.lower), joint.upper)]
-        }
-        found = {}
-        for name in self.names:
-            pose, link = Pose(), name
-            for _ in joints:
-                if link not in turned:
-                    break
-                link, step = turned[link]
-                pose = step @ pose
-            found[name] = pose
-        return found
+        poses = link_poses(joints, [min(max(0.0, joint.lower), joint.upper) for joint in joints])
+        return {name: poses.get(name, Pose()) for name in self.names}
