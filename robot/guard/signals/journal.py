@@ -143,9 +143,11 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
     Returns:
         an event "contact_located" or "contact". None where the stop was made for something else.
     """
-    if not (contact := stop.details.get("contact")):
+    contact = stop.details.get("contact")
+    if not isinstance(contact, dict):  # a recording may hold anything
         return None
-    same = [event for event in events if event.name in _CONTACT_EVENTS and event.details["number"] == contact["number"]]
+    number = contact.get("number")
+    same = [event for event in events if event.name in _CONTACT_EVENTS and event.details.get("number") == number]
     return max(same, key=lambda event: event.name == EventName.CONTACT_LOCATED, default=None)
 
 
