@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from coneskin.core.errors import KinematicsError
@@ -161,12 +161,30 @@ def highest_acceleration(
     return found
 
 
-def held_braking(model: ArmModel, inertias: Sequence[ArmInertia], q: Sequence[float], qd: Sequence[float]) -> float:
-    """Return the hardest braking of the leading joint for which the motors have the torque, upright [rad/s^2].
+def held_braking(
+    name: str, payload: float = 0.0, centre: Sequence[float] = (0.0, 0.0, 0.0)
+) -> Callable[[Joints, Joints], float] | None:
+    """Return what tells how hard an arm's motors can brake it at joint positions and speeds, upright [rad/s^2].
 
-    It is the least of some inertias, such as that of a bare arm and of one with all that it may carry; infinite where
-    the arm stands, and at least `_LEAST_BRAKING`, where a real arm would sag.
+    That is of the leading joint, and the least of the bare arm and of one with all that it carries; infinite where the
+    arm stands, and at least `_LEAST_BRAKING`, where a real arm would sag.
+
+    Args:
+        name: of the arm's model.
+        payload: the most that it carries, taken as a point [kg].
+        centre: of the payload, in the flange's frame [m].
+
+    Returns:
+        it; None for an arm of unknown inertia.
     """
+    try:
+        bare = arm_inertia(name)
+    except KinematicsError:
+        return None
+    return functools.partial(_held, arm_model(name), tuple(dict.fromkeys((bare, loaded(bare, payload, centre)))))
+
+
+def _held(model: ArmModel, inertias: Sequence[ArmInertia], q: Joints, qd: Joints) -> float:
     lead = max(map(abs, qd))
     if lead == 0.0:
         return math.inf

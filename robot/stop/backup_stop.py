@@ -14,6 +14,7 @@ from contextlib import suppress
 from enum import Enum
 
 from coneskin.core.errors import ConeSkinError
+from coneskin.robot.arm.model import Joints
 from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.protocol import ArmDriver, PayloadReader, StopConnections
 from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
@@ -48,6 +49,7 @@ class StandstillHold:
         limits: of the monitoring.
         deceleration: of its stops, where the guard asks for no other [rad/s2].
         reader: of the controller's state, open; None where there is none yet.
+        held_braking: as of `ArmSupervisor`.
         clock: monotonic seconds.
 
     Attributes:
@@ -61,6 +63,7 @@ class StandstillHold:
         limits: MonitoringLimits,
         deceleration: float,
         reader: PayloadReader | None = None,
+        held_braking: Callable[[Joints, Joints], float] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.reader = reader
@@ -69,6 +72,7 @@ class StandstillHold:
         self._connections = connections
         self._limits = limits
         self._deceleration = deceleration
+        self._held_braking = held_braking
         self._clock = clock
         own = frozenset[StopPath]().union(*driver.lost_with.values())
         self._stop = ArmStop(limits, tuple(path for path in _STOP_PATHS if path in own))
@@ -89,8 +93,11 @@ class StandstillHold:
             self._deceleration = deceleration
         self._stop.send(StopProgram(self._deceleration), self)
         self._began = self._due = now = self._clock()
-        speed = None if self._state is None or self.states_missing() else self._state.speed
-        self._stop.begin(now, speed)
+        state, held = None if self.states_missing() else self._state, self._held_braking
+        if state is None or held is None:
+            self._stop.begin(now, None if state is None else state.speed)
+        else:
+            self._stop.begin(now, state.speed, held(state.q, state.qd))
         self._phase = _HoldPhase.STOPPING_AGAIN if self.failed else _HoldPhase.STOPPING
 
     @property

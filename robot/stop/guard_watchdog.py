@@ -19,6 +19,7 @@ from contextlib import ExitStack
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
+from coneskin.robot.arm.inertia import held_braking
 from coneskin.robot.driver.liveness import BEAT_PERIOD, GUARD_SILENCE, UNGUARDED_TIME
 from coneskin.robot.driver.messages import LEAVE, Release, Shutdown, StatusReport, StopProgram, decode_command
 from coneskin.robot.driver.protocol import PayloadReader, load_driver
@@ -136,7 +137,8 @@ def main(arguments: list[str]) -> int:
             if not second:
                 connections = stack.enter_context(driver.stop_connections(host))
                 reader = stack.enter_context(driver.state_reader(host))
-            hold = StandstillHold(driver, connections, limits, settings["deceleration"], reader)
+            held = held_braking(settings["model"], settings["payload"], settings["payload_xyz"])
+            hold = StandstillHold(driver, connections, limits, settings["deceleration"], reader, held)
             stack.callback(hold.close)
             lifeline.hold()
             guard.send(StatusReport("ready").encode())

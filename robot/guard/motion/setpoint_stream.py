@@ -7,7 +7,7 @@ goes to a setpoint program in the controller. Built only where a reaction of the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from coneskin.robot.arm.model import ArmModel, Joints
@@ -19,6 +19,7 @@ from coneskin.robot.guard.signals.journal import EventName, Outputs, describe_wa
 from coneskin.robot.reaction.bare_side import MAX_BARE_WAY, BareSides
 from coneskin.robot.reaction.contact_supervision import ContactSupervision
 from coneskin.robot.reaction.motion_choice import ReactionMotion, plan_reaction_motion
+from coneskin.robot.reaction.retreat import plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 
@@ -90,6 +91,7 @@ class ReactionPlanner:
         watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
         table: height in the base frame that the arm must not go below while it moves [m].
         bare: sides of the arm that no skin covers. None where there are none.
+        held_braking: as of `ArmSupervisor`.
 
     Attributes:
         torque: from outside on the joints.
@@ -101,7 +103,9 @@ class ReactionPlanner:
         watchdog_hz: float | None = None,
         table: float | None = None,
         bare: BareSides | None = None,
+        held_braking: Callable[[Joints, Joints], float] | None = None,
     ) -> None:
+        self._held_braking = held_braking
         self.torque = OutsideTorque(model)
         self._bare = bare
         self._model = model
@@ -123,6 +127,7 @@ class ReactionPlanner:
         """
         if self.torque.now is None:
             return "the controller sends no motor currents: nothing shows what the arm presses on"
+        reaction = self._as_held(reaction, here, contacts)
         motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
@@ -144,6 +149,14 @@ class ReactionPlanner:
             self._token += 1
             program = SetpointProgram(self._token, reaction.deceleration, self._watchdog_hz)
         return MotionStream(motion, self._model, reaction, self.torque, self._bare, here, contacts, program, out)
+
+    def _as_held(self, reaction: Reaction, here: ArmState, contacts: Sequence[ContactOnLink]) -> Reaction:
+        """Return a reaction whose acceleration, with which it also brakes, the motors hold on the way that begins."""
+        plan = plan_retreat(self._model, here, contacts, reaction)
+        step = plan if isinstance(plan, Done) else retreat_step(plan, here)
+        if isinstance(step, Done) or self._held_braking is None:
+            return reaction
+        return replace(reaction, acceleration=min(reaction.acceleration, self._held_braking(here.q, step.qd)))
 
 
 def _bare_way(bare: BareSides, q: Joints, there: Sequence[float]) -> str:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -24,13 +23,13 @@ if TYPE_CHECKING:
     from coneskin.geometry.displacement_map import DisplacementMap
     from coneskin.geometry.placed_frustum import PlacedFrustum
     from coneskin.geometry.pose import Pose, Vector
-    from coneskin.robot.arm.model import ArmModel, Joints
+    from coneskin.robot.arm.model import ArmModel
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
     from coneskin.skin.detection.stream import TouchStream
 
-    from .values.scene import ArmScene, Scene, SpeedLimitScene
+    from .values.scene import Scene, SpeedLimitScene
 
 _MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
 
@@ -82,6 +81,7 @@ def withheld_motion(scene: Scene) -> str:
 
 
 def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
+    from coneskin.robot.arm.inertia import held_braking
     from coneskin.robot.driver.protocol import HeartbeatDriver
     from coneskin.robot.driver.values import EXTERNAL_PATHS, INTERNAL_PATHS, StopPath
     from coneskin.robot.guard.arm_supervisor import ArmSupervisor
@@ -97,6 +97,7 @@ def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
     if not scene.arm.slider_stop:
         own -= {StopPath.SLIDER}
     paths = tuple(path for path in (INTERNAL_PATHS if internal else EXTERNAL_PATHS) if path in own)
+    held = held_braking(scene.arm.model, scene.arm.payload, scene.arm.payload_xyz)
     planner = None
     if rules.move:
         from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
@@ -104,27 +105,14 @@ def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
 
         watchdog = None if internal else scene.arm.watchdog_hz
         bare = BareSides(arm, [(item.link, item.frustum) for item in placed])
-        planner = ReactionPlanner(arm, watchdog, scene.arm.table_z, bare)
+        planner = ReactionPlanner(arm, watchdog, scene.arm.table_z, bare, held)
     heartbeat = None
     if not internal and isinstance(driver, HeartbeatDriver):
         from coneskin.robot.guard.controller_heartbeat import ControllerHeartbeat
 
         heartbeat = ControllerHeartbeat(scene.arm.controller_heartbeat == "required")
     limit = None if scene.speed_limit is None else _speed_limit(scene, scene.speed_limit, arm)
-    held = _held_braking(scene.arm)
     return ArmSupervisor(arm, driver, rules, scene.monitoring_limits, paths, planner, heartbeat, limit, held)
-
-
-def _held_braking(arm: ArmScene) -> Callable[[Joints, Joints], float] | None:
-    """Return what tells how hard an arm brakes, bare and with all that it carries; None for one of unknown inertia."""
-    from coneskin.robot.arm.inertia import arm_inertia, held_braking, loaded
-
-    try:
-        bare = arm_inertia(arm.model)
-    except KinematicsError:
-        return None
-    inertias = (bare, loaded(bare, arm.payload, arm.payload_xyz)) if arm.payload else (bare,)
-    return partial(held_braking, arm.arm_model, inertias)
 
 
 def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLimit:

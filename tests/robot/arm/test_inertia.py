@@ -108,14 +108,25 @@ def test_no_digit_of_a_table_has_changed(name: str) -> None:
 def test_with_the_braking_that_is_held_one_motor_gives_all_that_it_has(payload: float) -> None:
     model, bare = arm_model("UR10e"), arm_inertia("UR10e")
     q, qd = (0.3, -0.2, 0.4, -1.1, 0.9, 0.5), (0.4, 0.9, -0.7, 0.6, 0.5, -0.8)
-    inertia = loaded(bare, payload, (0.0, 0.02, 0.1))
-    held = held_braking(model, (inertia,), q, qd)
-    torques = joint_torques(model, inertia, q, qd, [-held * speed / 0.9 for speed in qd])
-    assert max(abs(t) / most for t, most in zip(torques, inertia.torque, strict=True)) == pytest.approx(1.0)
-    assert held_braking(model, (bare, inertia), q, qd) <= held
-    assert held_braking(model, (inertia,), q, (0.0,) * 6) == math.inf
+    centre = (0.0, 0.02, 0.1)
+    braking = held_braking("UR10e", payload, centre)
+    assert braking is not None
+    held, shares = braking(q, qd), []
+    for inertia in (bare, loaded(bare, payload, centre)):
+        torques = joint_torques(model, inertia, q, qd, [-held * speed / 0.9 for speed in qd])
+        shares += [abs(t) / most for t, most in zip(torques, inertia.torque, strict=True)]
+    assert max(shares) == pytest.approx(1.0)
+    assert braking(q, (0.0,) * 6) == math.inf
+
+
+def test_what_it_carries_lets_an_arm_brake_no_harder_and_one_unknown_tells_nothing() -> None:
+    q, qd = (0.0,) * 6, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
+    held = [braking(q, qd) for kg in (0.0, 12.5) if (braking := held_braking("UR10e", kg)) is not None]
+    assert held == pytest.approx([17.1, 2.1], abs=0.1)  # rad/s2, of `bench deceleration`
+    assert held_braking("another arm") is None
 
 
 def test_a_joint_that_no_motor_holds_has_the_least_braking() -> None:
-    model, heavy = arm_model("UR3e"), loaded(arm_inertia("UR3e"), 30.0, (0.0, 0.0, 0.0))
-    assert held_braking(model, (heavy,), (0.0,) * 6, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)) == 0.5
+    braking = held_braking("UR3e", 30.0)
+    assert braking is not None
+    assert braking((0.0,) * 6, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)) == 0.5

@@ -84,7 +84,7 @@ def world():
 
 
 def holding(world):
-    return StandstillHold(world, world, MonitoringLimits(), 10.0, world, world.clock)
+    return StandstillHold(world, world, MonitoringLimits(), 10.0, world, clock=world.clock)
 
 
 def stop(hold, deceleration=None, over=lambda: False):
@@ -113,6 +113,28 @@ def test_a_speed_from_before_a_silence_is_not_that_of_the_stop(world, monkeypatc
     world.talks, world.now = talks, world.now + 10.0
     stop(ours, over=lambda: True)
     assert made[-1][1] == speed
+
+
+@pytest.mark.pure
+@pytest.mark.parametrize(("held", "budget"), [(2.5, 0.5), (40.0, 0.2)])
+def test_a_stop_has_the_time_that_the_motors_take(world, monkeypatch, held, budget):
+    """1 rad/s at 2.5 rad/s2, or at the 10 that are commanded, and four times 25 ms."""
+    made = []
+    monkeypatch.setattr(module, "StopMonitor", lambda *given: made.append(given) or StopMonitor(*given))
+    ours = StandstillHold(
+        world,
+        world,
+        MonitoringLimits(),
+        10.0,
+        world,
+        lambda q, qd: held if (q, qd[0]) == (Q, 1.0) else 0.1,
+        world.clock,
+    )
+    world.clock()
+    stop(ours, over=lambda: world.now > 0.1)
+    world.now += 0.002
+    stop(ours, over=lambda: True)
+    assert made[-1][4] == pytest.approx(budget)
 
 
 def test_while_the_arm_moves_it_is_not_given_up_and_a_protective_stop_is_left_to_work(world):

@@ -55,6 +55,18 @@ def test_a_harder_rule_ends_it():
     assert rig.core.phase is Phase.HALTING
 
 
+@pytest.mark.parametrize(
+    ("kind", "held", "expected"), [("retreat", 2.0, 2.0), ("comply", 2.0, 2.0), ("retreat", 9.0, 4.0)]
+)
+def test_a_motion_away_brakes_no_harder_than_the_motors_hold(kind, held, expected):
+    reaction = comply() if kind == "comply" else Reaction(kind="retreat")
+    rig = GuardRig(touch(0.5, 1.5), reaction=reaction, speed=0.5)
+    rig.core._arm._planner._held_braking = lambda q, qd: held if any(qd) else math.inf
+    rig.run(1.0)
+    sent = [command.acceleration for command in rig.arm.commands if isinstance(command, SetJointVelocity)]
+    assert max(sent) == expected
+
+
 def test_a_slow_arm_waits_at_standstill_for_the_place_of_the_touch():
     """At 12 bits a place takes some tens of frames, and this arm stands after ten."""
     rig = GuardRig(touch(0.5, 1.5), reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.7)
