@@ -29,6 +29,8 @@ _WITH_PROCESSES = (  # tests that take turns with a few others; below this folde
 )
 _OUTCOMES = ("passed", "failed", "error", "xfailed", "xpassed", "skipped")  # as pytest names them
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml
+#: mark -> what stands in each file that has tests with it; other files are not read for it
+_MARKED_BY = {"long": ("long", "sweep("), "processes": ("mark.processes",), "hypothesis": ("hypothesis",)}
 
 # A slow machine is no failure, so nothing here depends on time; the same examples every time, so nothing on luck.
 _STEADY = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow], "database": None}
@@ -45,15 +47,40 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.markexpr = ""
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Pass over the files of which -m selects no test: to import all takes each worker seconds in each session."""
+    if not (collection_path.match("test_*.py") and " or " not in config.option.markexpr):
+        return None
+    words = config.option.markexpr.split(" and ")
+    if any(word in _MARKED_BY and not _may_be_marked(collection_path, word) for word in words):
+        return True
+    return True if "not processes" in words and _has_processes(collection_path) else None
+
+
+@cache
+def _may_be_marked(path: Path, mark: str) -> bool:
+    if mark == "processes" and _has_processes(path):
+        return True
+    text = path.read_text(encoding="utf-8")
+    return any(word in text for word in _MARKED_BY[mark])
+
+
 @pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests with real processes: they mostly wait, and need a share of the computer when they do not."""
+    """Mark the tests with real processes: they mostly wait, and need a share of the computer when they do not.
+
+    Raises:
+        pytest.UsageError: a test's mark stands in another file, so that -m would pass over it.
+    """
     from coneskin.core.version import code_build
 
     compiled = code_build() == "compiled"
     for item in items:
         if _has_processes(item.path):
             item.add_marker(pytest.mark.processes)
+        for mark in _MARKED_BY:
+            if item.get_closest_marker(mark) and not _may_be_marked(item.path, mark):
+                raise pytest.UsageError(f"{item.nodeid}: write {_MARKED_BY[mark][0]} in its file, by which -m finds it")
         if compiled and item.get_closest_marker("pure"):
             item.add_marker(pytest.mark.skip("of the pure Python code: it is patched, or its calls are counted"))
 
