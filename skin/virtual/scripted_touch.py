@@ -121,6 +121,8 @@ class ScriptedTouch:
             return 0.0
         swing, state, slope = 0.5 * self.force, 0.0, self._slope
         ramp = min(self.rise, 0.5 * length)  # a short touch turns back on its way up
+        if ramp + self.growth_time + _MEMORY_TIMES * foam.relaxation_time < since <= length - ramp:
+            return self._risen(self.growth_time)
         if ramp > 0.0:
             rate = math.pi / self.rise
             state = foam.advance_swing(state, swing, swing, rate, 0.0, min(since, ramp))

@@ -13,6 +13,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
+from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS, Frame
 
@@ -108,7 +109,7 @@ class VirtualSkin:
             )
         self._touches: dict[str, list[PlacedTouch]] = {sensor.name: [] for sensor in self.sensors}
         self._ahead: dict[str, list[tuple[_Scenes, list[Matrix]]]] = {}
-        self._measured: dict[str, tuple[object, ConverterInputs]] = {}
+        self._measured: dict[str, tuple[object, list[float]]] = {}
         for sensor in self.sensors:  # so that the first touch does not wait for what is loaded on first use
             self.model.prepare(sensor, LayerContact(0.5 * sensor.frustum.slant, 0.5 * sensor.frustum.wrap, 1e-3))
         for touch in touches:
@@ -156,8 +157,8 @@ class VirtualSkin:
         while cycle * period < self.duration:
             for place, sensor in enumerate(self.sensors):
                 start = cycle * period + 3.0 * step * place
-                volts = self._volts(sensor, (start + step, start + 2.0 * step, start + 3.0 * step), index)
-                counts = self._convert(sensor, volts, rng, start)
+                exact = self._exact_counts(sensor, (start + step, start + 2.0 * step, start + 3.0 * step), index)
+                counts = self._convert(sensor.electronics, exact, rng, start)
                 clock = int((start + step) * 1e6 * self.imperfections.clock_ratio) & 0xFFFFFFFF
                 head = (self.frame_length, sensor.device_id, sensor.sensor_id, 0, cycle & 0xFFFF, clock)
                 yield start + 3.0 * step, frame_of(head, counts)
@@ -177,8 +178,8 @@ class VirtualSkin:
         for time, frame in self.frames():
             yield time, line.send(frame)
 
-    def _volts(self, sensor: Sensor, times: tuple[float, float, float], index: int) -> ConverterInputs:
-        """Return the converter's inputs; the newest result is kept, because a touch mostly rests."""
+    def _exact_counts(self, sensor: Sensor, times: tuple[float, float, float], index: int) -> list[float]:
+        """Return the counts without noise and rounding; the newest result is kept, because a touch mostly rests."""
         scenes = tuple(self._contacts(sensor, time) for time in times)
         leaks = tuple(self.imperfections.leak + self.imperfections.leak_drift * time for time in times)
         wiring = self.faults.wiring_at(index)
@@ -189,7 +190,7 @@ class VirtualSkin:
         if known is None or known[0] != key:
             dry = zip(self._sheets(sensor, scenes, times), leaks, strict=True)
             sheets = [_warmed(_leaking(y, leak), sensor, grown) for y, leak in dry]
-            known = (key, measure(sensor, sheets, wiring))
+            known = (key, self._amplify(sensor, measure(sensor, sheets, wiring)))
             self._measured[sensor.name] = known
         return known[1]
 
@@ -231,8 +232,8 @@ class VirtualSkin:
                     contacts.append(part)
         return tuple(contacts)
 
-    def _convert(self, sensor: Sensor, volts: ConverterInputs, rng: random.Random, start: float) -> dict[str, int]:
-        """Return the counts of the converter by field: settling, mains, gain, offset, noise and rounding."""
+    def _amplify(self, sensor: Sensor, volts: ConverterInputs) -> list[float]:
+        """Return the counts of the converter in the order of its channels: settling, gain and offset."""
         real, parts = self.imperfections, sensor.electronics
         values = volts._asdict()
         if real.settling_time:
@@ -243,14 +244,22 @@ class VirtualSkin:
             before |= {"angular_a": a, "angular_b": b}  # the wires' potentials one phase before
             for name, left in before.items():
                 values[name] += left_over * (left - values[name])
-        full, counts = parts.full_count, {}
+        full = parts.full_count
         volt, ampere = full / parts.adc_volts * real.supply_ratio, full / parts.current_full_scale * real.supply_ratio
         zero = full * (parts.current_zero / parts.current_full_scale + real.current_offset)
-        mains = real.mains_volts * math.sin(_MAINS_RATE * start) if real.mains_volts else 0.0
-        for name in self._channels:
-            value = values[name] + (mains if name in _GUIDE_NAMES else 0.0)
-            current = name in _CURRENT_NAMES
-            count = (value * ampere * real.current_gain + zero if current else value * volt) + real.offset_counts
+        return [
+            (values[name] * ampere * real.current_gain + zero if name in _CURRENT_NAMES else values[name] * volt)
+            + real.offset_counts
+            for name in self._channels
+        ]
+
+    def _convert(self, parts: Electronics, exact: list[float], rng: random.Random, start: float) -> dict[str, int]:
+        """Return the counts by field: mains, noise and rounding."""
+        real, full, counts = self.imperfections, parts.full_count, {}
+        mains = real.mains_volts * math.sin(_MAINS_RATE * start) * full / parts.adc_volts * real.supply_ratio
+        for name, count in zip(self._channels, exact, strict=True):
+            if mains and name in _GUIDE_NAMES:
+                count += mains
             if real.noise_counts:
                 count += rng.gauss(0.0, real.noise_counts)
             counts[name] = min(max(round(count), 0), full)
