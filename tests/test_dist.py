@@ -178,7 +178,8 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
     assert process.returncode == 0
     assert said.pop("RTDE") == b"\0\4V\1"
     assert said.pop("dashboard") == b"Conn"
-    assert set(said) == {"primary", "secondary", "realtime", "interpreter"}
+    states = ("primary", "secondary", "realtime")
+    assert set(said) == {*states, *(f"{name}, read-only" for name in states), "interpreter"}
     assert all(len(data) == 4 for data in said.values())
 
 

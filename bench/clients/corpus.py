@@ -14,11 +14,10 @@ from __future__ import annotations
 import argparse
 import io
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from bench.report import head
+from bench import report
 from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
@@ -72,19 +71,17 @@ def run_with(model: str, root: Path, path: Path, seconds: float) -> Found:
     return Found(path.relative_to(root).parts[0], path.relative_to(root).as_posix(), why, told)
 
 
-def show(found: list[Found]) -> Iterator[str]:
-    """Yield the share of each folder, and each program that does not run."""
-    yield "| folder | programs | run | share | end in a protective stop |"
-    yield "|---|---|---|---|---|"
+def show(found: list[Found]) -> None:
+    """Show the share of each folder, and each program that does not run."""
+    rows = []
     for name in [*sorted({one.folder for one in found}), ""]:
         here = [one for one in found if not name or one.folder == name]
         runs = [one for one in here if not one.why]
         stops = sum(bool(one.told) for one in runs)
-        yield f"| {name or 'all'} | {len(here)} | {len(runs)} | {100.0 * len(runs) / len(here):.0f} % | {stops} |"
-    yield from ("", "| program | why it does not run |", "|---|---|")
-    for one in found:
-        if one.why:
-            yield f"| {one.name} | {one.why[:200]} |".replace("\n", " ")
+        rows.append([name or "all", len(here), len(runs), f"{100.0 * len(runs) / len(here):.1f} %", stops])
+    report.show("programs that run", ["folder", "programs", "run", "share", "end in a protective stop"], rows)
+    rest = [[one.name, " ".join(one.why.split())[:120]] for one in found if one.why]
+    report.show("the rest", ["program", "why it does not run"], rest)
 
 
 def main() -> int:
@@ -100,5 +97,6 @@ def main() -> int:
     if args.json:
         print(json.dumps([one._asdict() for one in found]))
     else:
-        print("\n".join([head(), "", *show(found)]))
+        print(report.head())
+        show(found)
     return 0 if sum(not one.why for one in found) >= 0.9 * len(found) else 1

@@ -23,7 +23,7 @@ from coneskin.robot.ur.measured import read_measured
 
 from .compiler import SIMULATOR_MEMORY, bounded_memory
 from .machine.controller import Controller
-from .machine.states import DEFAULT_MODEL, PORTS, START_Q, Options, Version
+from .machine.states import DEFAULT_MODEL, PORTS, READ_ONLY, START_Q, Options, Version
 from .motion.plant import RemotePlant
 from .server import Server, is_loopback
 
@@ -87,13 +87,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="control at the start; in local control no program and no command is taken. With remote control disabled "
         "in its settings, as in URSim, it takes all and says that it is not in remote control (%(default)s)",
     )
+    services = [name for name in PORTS if not name.endswith(READ_ONLY)]
     add(
         "--closed",
         nargs="+",
         default=(),
-        choices=tuple(PORTS),
+        choices=services,
         metavar="SERVICE",
-        help=f"services that are switched off: {', '.join(PORTS)}",
+        help=f"services that are switched off: {', '.join(services)}",
     )
     add(
         "--measured",

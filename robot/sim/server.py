@@ -22,7 +22,7 @@ from coneskin.core.errors import RobotRefused
 
 from .compiler import Compiler
 from .machine.controller import Controller
-from .machine.states import PORTS
+from .machine.states import PORTS, READ_ONLY, SCRIPT_PORTS
 from .motion.arm import CYCLE
 from .ports.client import MAX_MESSAGES, UNREAD_TIMEOUT, Client, LineReader
 from .ports.client_interface import ScriptPort, due_packets, greeting, interpreter_reply
@@ -31,13 +31,13 @@ from .ports.rtde import RtdeOutputs, RtdeSession
 from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
-_SCRIPT_PORTS = ("primary", "secondary", "realtime")  # that take URScript, and send the state
+_STATE_PORTS = (*SCRIPT_PORTS, *(name + READ_ONLY for name in SCRIPT_PORTS))
 _WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
 #: word of a line -> the services that it means
 _SERVICE_PORTS = {
     "rtde": ("RTDE",),
     "dashboard": ("dashboard",),
-    "scripts": _SCRIPT_PORTS,
+    "scripts": SCRIPT_PORTS,
     "network": tuple(PORTS),
 }
 
@@ -119,6 +119,10 @@ def _each(action: Callable[[str], int | None], names: tuple[str, ...]) -> int | 
     """Do something to services; return how many connections that has closed, or True where it closes none."""
     closed = [count for name in names if (count := action(name)) is not None]
     return sum(closed) if closed else True
+
+
+def _service(name: str) -> str:
+    return name.removesuffix(READ_ONLY)
 
 
 _MAX_LATENESS = 0.05  # s; later cycles are skipped, not made up for: the process was frozen
@@ -296,14 +300,16 @@ class Server:
         self._interface.turn()
         self.controller.update()
         if self._remote and not self.controller.remote_control:  # what is opened from now on is read-only
-            for name in _SCRIPT_PORTS:
+            for name in SCRIPT_PORTS:
                 self.drop_all(name)
         self._remote = self.controller.remote_control
 
     def _publish(self) -> None:
-        listening = frozenset(name for name in _SCRIPT_PORTS if self._clients[name])
-        for name, (state, messages) in due_packets(self.controller, listening).items():
-            for client in list(self._clients[name]) if name not in self._cut else ():
+        names = [name for name in _STATE_PORTS if self._clients[name] and name not in self._cut]
+        due = due_packets(self.controller, frozenset(map(_service, names)))
+        for name in names:
+            state, messages = due.get(_service(name), (b"", b""))
+            for client in list(self._clients[name]) if state or messages else ():
                 late = len(client.unsent)  # one that does not read misses states, and in the end messages too
                 self._send(name, client, (b"" if late else state) + (messages if late < MAX_MESSAGES else b""))
         if self.faults.rtde_silent or "RTDE" in self._cut:
@@ -352,14 +358,15 @@ class Server:
             return Client(sock, LineReader(self.faults.answer))
         if name == "interpreter":
             return Client(sock, LineReader(partial(interpreter_reply, self.controller)))
-        port = ScriptPort(self.controller, self._program, messages=name == "primary")
+        kind = _service(name)
+        port = ScriptPort(self.controller, self._program, messages=kind == "primary", read_only=name != kind)
         return Client(sock, port, left=lambda: port.left)
 
     def _greeting(self, name: str) -> bytes:
         """Return what a new client of a service gets first."""
         if name == "dashboard" and not self.faults.dashboard_silent:
             return WELCOME.encode() + b"\n"
-        return greeting(self.controller, name) if name in _SCRIPT_PORTS else b""
+        return greeting(self.controller, _service(name)) if name in _STATE_PORTS else b""
 
     def _read(self, name: str, client: Client) -> None:
         if client not in self._clients[name] or name in self._cut:

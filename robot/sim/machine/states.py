@@ -67,7 +67,9 @@ def has_since(version: Version, polyscope_5: int | None, cb3: int | None) -> boo
 
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
-PORTS |= {"interpreter": 30020}
+SCRIPT_PORTS = ("primary", "secondary", "realtime")  #: those that take URScript, and send the state
+READ_ONLY = ", read-only"  #: end of the name of a port beside each of these, which takes nothing
+PORTS |= {"interpreter": 30020, **{name + READ_ONLY: PORTS[name] + 10 for name in SCRIPT_PORTS}}
 FIRST_X = 10  #: major version of PolyScope X
 #: arm that is simulated where none is named
 DEFAULT_MODEL = "UR5e"
@@ -111,7 +113,7 @@ class Options:
     def services(self) -> dict[str, int]:
         """Services that are open -> their TCP ports. PolyScope X has no dashboard."""
         closed = self.closed | {"dashboard"} if self.version[0] >= FIRST_X else self.closed
-        return {name: port for name, port in PORTS.items() if name not in closed}
+        return {name: port for name, port in PORTS.items() if name.removesuffix(READ_ONLY) not in closed}
 
 
 #: how grave an error is: report levels of the client interface

@@ -7,7 +7,7 @@ the realtime interface is its length, then doubles at fixed places; it grew at i
 not simulated has the value of an arm at rest.
 
 These ports take URScript, and lines which Universal Robots does not document but whose own client library sends. Such a
-line acts at once and does not touch a running program otherwise.
+line acts at once and does not touch a running program otherwise. Ports 30011 to 30013 send the same, and take nothing.
 
 Source: Universal Robots, "Client Interface" (version 5.x, and the sheet of the realtime client); the sizes of states
 are those of a recorded packet in the tests of Universal Robots' own client library.
@@ -240,15 +240,20 @@ class ScriptPort:
         controller: takes the commands.
         run: takes the text of a program.
         messages: whether the client reads messages: on the primary interface alone.
+        read_only: whether this port takes nothing.
 
     Attributes:
         left: its connection has to end: what comes is no program.
     """
 
-    def __init__(self, controller: Controller, run: Callable[[str], None], *, messages: bool = False) -> None:
+    def __init__(
+        self, controller: Controller, run: Callable[[str], None], *, messages: bool = False, read_only: bool = False
+    ) -> None:
         self._controller, self._run, self._messages = controller, run, messages
         self._rest = ""
-        self._opened_local = not controller.remote_control
+        self._read_only = (
+            "this port is read-only" if read_only else "" if controller.remote_control else "local control"
+        )
         self.left = False
 
     def __call__(self, data: bytes) -> bytes:
@@ -257,8 +262,8 @@ class ScriptPort:
         Nor is it after a switch to remote control, over a connection that was opened before: it stays read-only, which
         the primary interface says.
         """
-        if self._opened_local or not self._controller.remote_control:
-            self._controller.log("dropped", reason="local control")
+        if self._read_only or not self._controller.remote_control:
+            self._controller.log("dropped", reason=self._read_only or "local control")
             notice = states.ErrorNotice(_READ_ONLY, 0, "The connection is read-only")
             return _encode_notice(self._controller.timestamp, notice) if self._messages else b""
         programs, self._rest = complete_programs(self._rest + data.decode("utf-8", "replace"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import socket
 
 import pytest
@@ -237,6 +238,24 @@ def test_the_dashboard_ends_a_connection_that_has_said_quit() -> None:
         assert server._clients["dashboard"] == []
 
 
+def test_a_read_only_port_sends_what_the_other_does_and_takes_no_program() -> None:
+    """Nor a command; ports 30011 to 30013."""
+    log = io.StringIO()
+    with Server(Controller(Options(), log), free_host()) as server, contextlib.ExitStack() as stack:
+        ports = (30001, 30011, 30012, 30013)
+        socks = {port: stack.enter_context(socket.create_connection((server.host, port), 5.0)) for port in ports}
+        turn(server, 10)
+        for port, text in ((30011, b"stop program\n"), (30012, b"set_digital_out(0, True)\n"), (30013, b"halt\n")):
+            socks[port].sendall(text)
+        turn(server, 100)
+        assert log.getvalue().count("this port is read-only") == 3
+        assert '"event": "script"' not in log.getvalue()
+        said = {port: sock.recv(1 << 20) for port, sock in socks.items()}
+    assert said[30011].startswith(said[30001][:500])
+    assert len(said[30012]) > 2000
+    assert said[30013][:4] == (1220).to_bytes(4, "big")
+
+
 def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
     with Server(Controller(Options()), free_host()) as server, contextlib.ExitStack() as stack:
         for name, port in PORTS.items():
@@ -253,7 +272,10 @@ def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
 
 @pytest.mark.parametrize(
     ("options", "missing"),
-    [({"closed": frozenset({"primary", "RTDE"})}, {"primary", "RTDE"}), ({"version": (10, 11)}, {"dashboard"})],
+    [
+        ({"closed": frozenset({"primary", "RTDE"})}, {"primary", "primary, read-only", "RTDE"}),
+        ({"version": (10, 11)}, {"dashboard"}),
+    ],
 )
 def test_what_is_switched_off_or_not_there_takes_no_connection(options: dict[str, object], missing: set[str]) -> None:
     with Server(Controller(Options(**options)), free_host()) as server:  # type: ignore[arg-type]
