@@ -226,7 +226,8 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     """Choose the electronics for a sensor; none is ever refused here.
 
     * Supply: the largest reference within 80 % of the converter's range with which neither sheet draws more than 50 mA.
-    * Full scale of the current: the E96 shunt that gives the least range above 2.2 times the larger drive current.
+    * Full scale of the current: the E96 shunt that gives the least range above 2.2 times the larger drive current (under
+      1 ohm an E24 one).
     * Bits: 12, or as many up to 16 as give the smaller drive current 100 counts.
     * Pull-downs: the E24 value from twice the larger sheet resistance on, 10 to 100 kohm.
 
@@ -250,7 +251,8 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     largest, smallest = supply / min(loops), supply / max(loops)
     full_scale = given.current_full_scale
     if full_scale is None:
-        shunt, _ = _of_series(_E96_SERIES, given.adc_volts / (SENSE_GAIN * HEADROOM * largest))
+        bound = given.adc_volts / (SENSE_GAIN * HEADROOM * largest)
+        shunt, _ = _of_series(_E96_SERIES if bound >= 1.0 else _E24_SERIES, bound)
         full_scale = given.adc_volts / (SENSE_GAIN * shunt)
     bits = given.adc_bits
     if bits is None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -29,8 +30,10 @@ PIN_OHMS = 30.0  #: of a controller's pin that holds a pull-down at ground, 25 t
 _USUAL_SILENCE_MS = 50  # what a scene allows by default
 _SPI_PINS = {"10": "CS", "11": "MOSI", "12": "MISO", "13": "SCK"}  # of an Uno or Nano
 _FIXED_VOLTS = 2.5  # of the cheap regulator
-_LEAST_CHIP_SHUNT = 10.0  # ohm; below, a shunt is a part of its own
-_LIST_COLUMNS = "count,names,what,value,number,second source,EUR,data sheet,limits not sourced"  # of the list of parts
+_SHUNT_PARTS = ((10.0, "resistor"), (1.0, "low_shunt"), (0.0, "least_shunt"))  # from so many ohm on
+_LIST_COLUMNS = (
+    "count,names,what,value,number,second source,EUR each,EUR,data sheet,limits not sourced"  # of the list of parts
+)
 WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
     *(("E_A", "white"), ("S_A", "brown"), ("E_B", "green"), ("S_B", "yellow"), ("E_C", "grey"), ("S_C", "pink")),
     *(("E_D", "blue"), ("S_D", "red"), ("GND", "black, violet"), ("SHIELD", "braid, here only")),
@@ -92,6 +95,11 @@ class BoardCircuit(NamedTuple):
         return found
 
     @property
+    def main_board(self) -> Component:
+        """The board that the sketch runs on."""
+        return Component("A1", self.board.name, self.facts.title, "the board", self.pins)
+
+    @property
     def components(self) -> list[Component]:
         """Everything on the board but the board itself, in order."""
         return list(_components(self))
@@ -100,16 +108,24 @@ class BoardCircuit(NamedTuple):
         """Return the bill of materials as CSV, a line for all alike, with a price for all of them [EUR]."""
         catalog, lines = part_catalog(), io.StringIO()
         alike: dict[tuple[str, str], list[str]] = {}
-        for component in [*self.components, Component("W1", "cable", "", "", {})]:
+        others = Component("W1", "cable", "", "", {}), *(Component(f"X{k}", "socket", "", "", {}) for k in (1, 2))
+        for component in [*self.components, *others]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
         rows.writerow(_LIST_COLUMNS.split(","))
         own = _unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
-        rows.writerow((1, "A1", self.facts.title, *[""] * 5, own))
+        rows.writerow((1, "A1", self.facts.title, *[""] * 6, own))
         for (part, value), names in alike.items():
-            row = catalog[part]
-            told = row["what"], value, row["number"], row["second"], f"{len(names) * row['price']:.1f}", row["source"]
-            rows.writerow((len(names), " ".join(names), *told, _unsourced_limits(row)))
+            row, count = catalog[part], len(names)
+            told = row["what"], value, *_order_numbers(row, value), row["price"], f"{count * row['price']:.1f}"
+            rows.writerow((count, " ".join(names), *told, row["source"], _unsourced_limits(row)))
+        adapters: dict[str, list[str]] = {}
+        for component in self.components:
+            adapters.setdefault(catalog[component.part].get("adapter", ""), []).append(component.name)
+        for package, names in adapters.items():
+            if package:
+                what = f"without a printed board: adapter from {package}, to pins of 2.54 mm"
+                rows.writerow((len(names), f"for {' '.join(names)}", what, "", "any", "any", 1, len(names), "", ""))
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
@@ -117,17 +133,13 @@ class BoardCircuit(NamedTuple):
         catalog = part_catalog()
         nets: dict[str, list[str]] = {}
         found: list[str] = []
-        for name, part, value, _, pins in self.components:
+        for name, part, value, _, pins in [self.main_board, *self.components]:
             row = catalog[part]
-            place = f' (footprint "{row["footprint"]}")' if "footprint" in row else ""
-            found.append(f'    (comp (ref "{name}") (value "{value or row["number"]}"){place})')
-            numbers = row.get("pins", {})
+            told = value or row["number"]
+            found.append(f'    (comp (ref "{name}") (value "{told}") (footprint "{row["footprint"]}"))')
             for pin, net in pins.items():
-                ends = (f'(node (ref "{name}") (pin "{number}"))' for number in numbers.get(pin, pin).split())
+                ends = (f'(node (ref "{name}") (pin "{number}"))' for number in row["pins"].get(pin, [pin]))
                 nets.setdefault(net, []).extend(ends)
-        for pin, net in self.pins.items():
-            nets.setdefault(net, []).append(f'(node (ref "A1") (pin "{pin}"))')
-        found = [f'    (comp (ref "A1") (value "{self.facts.title}"))', *found]
         at = enumerate(nets.items(), 1)
         listed = [f'    (net (code "{n}") (name "{net}") {" ".join(nodes)})' for n, (net, nodes) in at]
         return "\n".join(['(export (version "E")', "  (components", *found, "  )", "  (nets", *listed, "  ))", ""])
@@ -202,7 +214,10 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
             f"{sensor.name} needs switches of half an ohm, whose inputs stand 3.3 V, and the pins of a {facts.title} "
             f"have {facts.logic_volts:g} V: take another board"
         )
-    shunt = shunt_ohms(sensor.electronics)
+    shunt, supply = shunt_ohms(sensor.electronics), sensor.electronics.supply_volts
+    if supply != _FIXED_VOLTS:  # what a resistor of E96 at 100 uA gives
+        decade = math.floor(math.log10(supply))
+        supply = round(10.0 ** (round(96.0 * math.log10(supply)) / 96.0 - decade), 2) * 10.0**decade
     bits, volts, other = board.bits + _EXTRA_BITS, sensor.electronics.adc_volts, None
     if converter == BUILT_IN and not facts.own_converter:
         raise SensorError(
@@ -231,6 +246,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     pulldown = 1.0 / (1.0 / (resistor + PIN_OHMS + _WIRE_OHMS) + 1.0 / inputs) + lead
     electronics = replace(
         sensor.electronics,
+        supply_volts=supply,
         adc_bits=bits,
         adc_volts=volts,
         current_full_scale=volts * ampere,
@@ -250,8 +266,28 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
 
 
 def part_catalog() -> dict[str, Any]:
-    """Return the tables of parts.toml by name."""
-    return tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
+    """Return the tables of parts.toml by name; pins as the numbers of their pads."""
+    catalog = tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
+    for row in catalog.values():
+        pads: dict[str, list[str]] = {}
+        for number, names in enumerate(row.get("pins", "").split(), 1):
+            for name in names.split("="):
+                pads.setdefault(name, []).append(str(number))
+        row["pins"] = pads
+    return catalog
+
+
+def _order_numbers(row: Mapping[str, Any], value: str) -> tuple[str, str]:
+    """Return the order numbers of a part with a value, such as "2.2 kohm": of the first maker, and of the second."""
+    if "orders" in row:
+        return tuple(row["orders"][value])
+    if "{" not in row["number"]:
+        return row["number"], row["second"]
+    figure, unit = value.split()
+    letter = {"ohm": "R", "kohm": "K", "Mohm": "M"}[unit]
+    short = figure.replace(".", letter) if "." in figure else figure + letter
+    long = f"{float(figure):#.3g}".replace(".", letter).removeprefix("0")
+    return row["number"].format(short=short, long=long), row["second"].format(short=short, long=long)
 
 
 def _unsourced_limits(row: Mapping[str, Any]) -> str:
@@ -287,10 +323,11 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     else:
         unused = {"ILIM": "GND", "PGFB": "5V"}  # no limit of the current, no quick start
         yield part("U", "adjustable", IN="5V", EN="5V", OUT="REG", OUTS="REG", SET="SET", GND="GND", **unused)
-        yield two("R", "precise", _ohms_text(1e4 * parts.supply_volts), "SET", "GND")
+        yield two("R", "precise", _ohms_text(round(1e4 * parts.supply_volts, 6)), "SET", "GND")
         yield filtered("SET", "4.7 uF")
     yield filtered("REG", "10 uF")
-    yield two("R", "precise" if shunt >= _LEAST_CHIP_SHUNT else "low_shunt", f"{shunt:.3g} ohm", "REG", "RAIL")
+    kind = next(kind for ohms, kind in _SHUNT_PARTS if shunt >= ohms)
+    yield two("R", kind, f"{shunt:.3g} ohm", "REG", "RAIL")
     amplifier = {"IN+": "REG", "IN-": "RAIL", "REF": "BIAS", "OUT": "AMP", "VS": "3V3", "GND": "GND"}
     yield part("U", "amplifier", **amplifier)
     yield filtered("3V3", "100 nF")
@@ -346,6 +383,6 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         yield filtered("3V3", "100 nF")
     group = "connector and test points"
     yield part("J", "connector", **{f"_{k}": net for k, (net, _) in enumerate(WIRES, 1)})
-    yield two("R", "resistor", "0 ohm", "SHIELD", "GND")
+    yield two("R", "jumper", "", "SHIELD", "GND")
     for net in ("GND", "5V", "3V3", "RAIL", "AMP", "BIAS"):
         yield part("TP", "test_point", _1=net)

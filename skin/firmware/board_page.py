@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from xml.sax.saxutils import escape
 
 from .board_circuit import WIRES, BoardCircuit, Component, part_catalog
@@ -13,6 +14,8 @@ def board_page(circuit: BoardCircuit) -> str:
     parts = sensor.electronics
     count, volt = parts.full_count, parts.full_count / parts.adc_volts
     zero, bias = parts.count_amperes(0.0), 50.0 * parts.current_zero * circuit.shunt_ohms
+    clip = (3.3 - 1e-3 * part_catalog()["amplifier"]["limits"]["swing_mv"][1] - bias) / (50.0 * circuit.shunt_ohms)
+    share = clip / max(sensor.radial_amperes, sensor.angular_amperes)
     rate, remark = facts.rate, f"{facts.remark[:1].upper()}{facts.remark[1:]}. "
     if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
         chips = f"{'an' if other.pull_down else 'two'} {other.name.upper()} in place of its converter"
@@ -25,7 +28,14 @@ def board_page(circuit: BoardCircuit) -> str:
         "",
         f"Drive currents: {1e3 * sensor.radial_amperes:.3g} mA from {_ends(sensor.b_positive, 'B', 'A')}, "
         f"{1e3 * sensor.angular_amperes:.3g} mA from {_ends(sensor.c_positive, 'C', 'D')}; full scale "
-        f"{1e3 * parts.current_full_scale:.3g} mA.",
+        f"{1e3 * parts.current_full_scale:.3g} mA. The amplifier, on 3V3, ends at {1e3 * clip:.3g} mA, {share:.2f} "
+        "times the larger one; a short is told from twice.",
+        "",
+        "Build it on a printed board from board.net (two layers, ground all over the lower one), or on strip board "
+        "with the adapters and sockets of parts.csv; 0805 fits between holes of 2.54 mm. Not on a plug-in breadboard: "
+        "its contacts add ohms that come and go. Clamps within 10 mm of J1, so that each foil wire meets the clamp "
+        "first, then the bead or resistor. The amplifier's IN+ and IN- go to the pads of R1 on wires of their own. "
+        "Each 100 nF at its chip, each 470 pF at its converter's pin.",
         "",
         "| pin | net of the drawing |",
         "|---|---|",
@@ -55,7 +65,7 @@ def board_page(circuit: BoardCircuit) -> str:
         f"| `angular_current` | {parts.count_amperes(sensor.angular_amperes)} counts |",
         f"| the six guides, untouched | under {max(2, count // 100)} counts |",
         "",
-        "Flash (the first line where the compiler is from Debian's packages):",
+        "Flash (the first line with avr-gcc of Debian's packages, or with arduino-cli; the second by hand):",
         "",
         f"    coneskin firmware SENSOR --board {board.name} --to FOLDER --flash /dev/ttyACM0",
         f"    arduino-cli compile --upload --fqbn {facts.target} --port /dev/ttyACM0 coneskin",
@@ -112,8 +122,8 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
     """Return the drawing: every part with its pins, and at each pin the name of its net; equal names are joined."""
     catalog, lowest = part_catalog(), 0
     out: list[str] = []
-    board = Component("A1", "", circuit.facts.title, "", circuit.pins)
-    columns: list[tuple[int, list[tuple[str, list[Component]]]]] = [(130, [("the board", [board])])]
+    board = circuit.main_board
+    columns: list[tuple[int, list[tuple[str, list[Component]]]]] = [(130, [(board.group, [board])])]
     for x, groups in _COLUMN_GROUPS:
         parts = [(group, [c for c in circuit.components if c.group == group]) for group in groups]
         columns.append((x, [each for each in parts if each[1]]))
@@ -123,8 +133,9 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
             out.append(_text(x - 110, y, group, "group"))
             y += 12
             for component in components:
-                value = component.value or catalog[component.part]["number"].split()[-1]
-                drawn, height = _drawn(x, y, component, value)
+                row = catalog[component.part]
+                pads = {} if component is board else row["pins"]  # its own names stand on it
+                drawn, height = _drawn(x, y, component, component.value or row["number"].split()[-1], pads)
                 out += drawn
                 y += height
             y += _GROUP_GAP
@@ -134,13 +145,13 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
         f"<style>{_SVG_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{lowest + 10}" style="fill:#fff;stroke:none"/>',
         _text(20, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
-        _text(20, 58, f"Pins with the same word are joined. {_PAIR_WORDS}"),
+        _text(20, 58, f"Pins with the same word are joined; numbers are those of the pads. {_PAIR_WORDS}"),
     ]
     return "\n".join([*head, *out, "</svg>", ""])
 
 
-def _drawn(x: int, y: int, part: Component, value: str) -> tuple[list[str], int]:
-    """Draw a part around x from y on; return it, and how high it is. Of two pins it is a row, else a box."""
+def _drawn(x: int, y: int, part: Component, value: str, pads: Mapping[str, list[str]]) -> tuple[list[str], int]:
+    """Draw a part around x from y on; return it, and how high it is. Of two pins it is a row, else a box with pads."""
     pins = list(part.pins.items())
     if len(pins) < 3:
         ends = [_net(x - 74, y + 12, pins[0][1], "end"), *(_net(x + 74, y + 12, net, "start") for _, net in pins[1:])]
@@ -153,7 +164,10 @@ def _drawn(x: int, y: int, part: Component, value: str) -> tuple[list[str], int]
     ]
     for k, (pin, net) in enumerate(pins):
         left, at = k < rows, y + 16 + _ROW_HEIGHT * (k % rows + 1) - 2
-        out.append(_text(x - 66 if left else x + 66, at, pin, "", "start" if left else "end"))
+        numbers = pads.get(pin, [])
+        both = [",".join(numbers[:3]) + ("..." if len(numbers) > 3 else ""), pin]
+        told = " ".join(both if left else both[::-1]).strip()
+        out.append(_text(x - 66 if left else x + 66, at, told, "", "start" if left else "end"))
         out.append(_net(x - 74 if left else x + 74, at, net, "end" if left else "start"))
     return out, rows * _ROW_HEIGHT + 32
 

@@ -41,7 +41,7 @@ BOARD_FACTS: dict[str, BoardFacts] = {
         *("Teensy 4.0", "teensy:avr:teensy40", 3.3, "VIN", 100, "200, at most 1000: not tried"),
         "its pins do not stand more than 3.3 V",
     ),
-    "esp32": BoardFacts("ESP32 DevKit", "esp32:esp32:esp32", 3.3, "VIN", 100, "40, not tried", "", False),
+    "esp32": BoardFacts("ESP32-DevKitC", "esp32:esp32:esp32", 3.3, "5V", 100, "40, not tried", "", False),
 }
 
 

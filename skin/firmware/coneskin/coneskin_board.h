@@ -8,6 +8,7 @@
 // pull_down: pins at the far end of the resistors from C and D: low connects them
 // select:    pins that address an analog multiplexer where the board has too few channels; all six are then channels
 //            of the multiplexer, whose output is at the pin `common`
+// Pins of I2C stay free: A4 and A5, on a Pico 4 and 5, on an ESP32 21 and 22; so do 10 to 13 of an Uno with an LTC1867.
 // The tables are read by coneskin/skin/firmware/boards.py as well, for the wiring diagram: keep their form.
 #pragma once
 #include <Arduino.h>
@@ -42,11 +43,11 @@ const Board BOARD = {"uno", 10, 500000, {A0, A1, A2, A3}, A4, A5, {2, 3, 4, 5}, 
 #elif defined(ARDUINO_AVR_NANO_EVERY)
 const Board BOARD = {"nano-every", 10, 500000, {A0, A1, A2, A3}, A6, A7, {2, 3, 4, 5}, {6, 7, 8, 9}, {10, 11}, {NONE, NONE, NONE}, NONE};
 #elif defined(ARDUINO_ARCH_RP2040)
-const Board BOARD = {"pico", 12, 921600, {0, 1, 2, 3}, 4, 5, {2, 3, 4, 5}, {6, 7, 8, 9}, {10, 11}, {12, 13, 14}, 26};
+const Board BOARD = {"pico", 12, 921600, {0, 1, 2, 3}, 4, 5, {2, 3, 6, 7}, {8, 9, 10, 11}, {14, 15}, {16, 17, 18}, 26};
 #elif defined(CORE_TEENSY)
 const Board BOARD = {"teensy", 12, 921600, {A0, A1, A2, A3}, A4, A5, {2, 3, 4, 5}, {6, 7, 8, 9}, {10, 11}, {NONE, NONE, NONE}, NONE};
 #elif defined(ARDUINO_ARCH_ESP32)
-const Board BOARD = {"esp32", 12, 921600, {32, 33, 34, 35}, 36, 39, {16, 17, 18, 19}, {21, 22, 23, 25}, {26, 27}, {NONE, NONE, NONE}, NONE};
+const Board BOARD = {"esp32", 12, 921600, {NONE, NONE, NONE, NONE}, NONE, NONE, {16, 17, 18, 19}, {32, 33, 23, 25}, {26, 27}, {NONE, NONE, NONE}, NONE};
 #else
 #error "This board has no row yet: add one above, with the pins that you wired and the bits of its converter."
 #endif

@@ -87,11 +87,11 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
     pin = rng.uniform(20.0, 40.0)
     pull = circuit.pulldown_ohms * (1.0 + 0.01 * rng.uniform(-1, 1, 2) * precise[1])
     load = parts.input_ohms * (1.0 + 0.01 * rng.uniform(-1, 1, 4) * precise[1])
-    kind = "precise" if circuit.shunt_ohms >= 10.0 else "low_shunt"
-    shunt = circuit.shunt_ohms * (1.0 + 0.01 * _drawn(rng, limits[kind]["error_percent"]))
+    shunt = circuit.shunt_ohms * (1.0 + 0.01 * _drawn(rng, limits["resistor"]["error_percent"]))
     gain = SENSE_GAIN * (1.0 + 0.01 * _drawn(rng, limits["amplifier"]["gain_percent"]))
     amplifier = _drawn(rng, limits["amplifier"]["offset_uv"]) * 1e-6 if offset is None else offset
     three = 3.3 * (1.0 + 0.015 * rng.uniform(-1, 1))
+    highest = three - 1e-3 * limits["amplifier"]["swing_mv"][1]
     supply = parts.supply_volts * (1.0 + 0.01 * _drawn(rng, limits["regulator"]["error_percent"]))
     bias = parts.current_zero / 3.3 * SENSE_GAIN * circuit.shunt_ohms * three
     mux = limits["multiplexer"]["leak_na"][1] if circuit.board.common else 0.0
@@ -131,7 +131,7 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
             at = np.linalg.solve(g, source[..., None])[..., 0]
             first, second = ((2, 3), (2, 3), (0, 1))[number]
             out[:, 3 * number], out[:, 3 * number + 1] = at[:, first], at[:, second]
-            out[:, 3 * number + 2] = np.minimum(gain * (power - at[:, 8] + amplifier) + bias, three)
+            out[:, 3 * number + 2] = np.minimum(gain * (power - at[:, 8] + amplifier) + bias, highest)
             out[:, 9 + number] = at[:, 8]
         return out
 

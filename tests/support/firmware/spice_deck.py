@@ -86,7 +86,7 @@ def deck(
     for name, part, value, _, pins in circuit.components:
         net = {pin: at.replace("GND", "0").replace("SHIELD", "0") for pin, at in pins.items()}
         limits = catalog[part]["limits"]
-        if part in ("resistor", "precise", "low_shunt") and number(value) > 0.0:
+        if value.endswith("ohm"):
             out.append(f"R_{name} {net['1']} {net['2']} {number(value)}")
         elif part in ("filter", "decoupling"):
             out.append(f"C_{name} {net['1']} {net['2']} {number(value)}")
