@@ -66,6 +66,13 @@ def test_what_is_hardly_meant_is_warned_of(old: str, new: str, said: str) -> Non
     assert said in line
 
 
+@pytest.mark.parametrize(
+    ("place", "right"), [("0, 130, 0", True), ("0, 130, 392", True), ("0, 130, 200", False), ("60, 130, 0", False)]
+)
+def test_a_sheet_about_the_joint_at_an_end_of_a_tube_is_right(place: str, right: bool) -> None:
+    assert (doubts(PLAIN.replace("[0, 0, 80]", f"[{place}]\nrpy_deg = [90, 0, 0]")) == []) is right
+
+
 @pytest.mark.parametrize(("degrees", "doubted"), [(1.5708, True), (161.6, False), (98.96, False)])
 def test_an_angle_beyond_a_turn_in_radians_is_in_degrees(degrees: float, doubted: bool) -> None:
     assert TOUCHED != PLAIN

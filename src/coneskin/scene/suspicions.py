@@ -17,7 +17,7 @@ from .reader import TUBE_LENGTHS
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
-    from coneskin.geometry.pose import Pose
+    from coneskin.geometry.pose import Pose, Vector
     from coneskin.robot.arm.model import ArmModel
 
     from .values.scene import LinkScene, PlacedSensor, Scene
@@ -128,13 +128,15 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
             )
             continue
         beside = max(math.hypot(*begin[:2]), math.hypot(*end[:2]))
-        tilt = math.acos(min(1.0, abs(in_mesh.rotate((0.0, 0.0, 1.0))[2])))
+        along = in_mesh.rotate((0.0, 0.0, 1.0))
+        if _about_joint(begin, end, along, length):
+            continue
+        tilt = math.acos(min(1.0, abs(along[2])))
         if beside > _BESIDE or tilt > _TILT:
             yield (
                 f"{where} lies {1e3 * beside:.0f} mm beside the axis of the {name}, turned by "
-                f"{math.degrees(tilt):.0f} deg against it: right for a sheet about another axis of the link; otherwise "
-                "name the link and the arm that it was designed for; correct xyz_mm, rpy_deg or the frame if they are "
-                "yours"
+                f"{math.degrees(tilt):.0f} deg against it: name the link and the arm that it was designed for; correct "
+                "xyz_mm, rpy_deg or the frame if they are yours"
             )
         radius = max(cone.radius1, cone.radius2)
         if radius > room:
@@ -143,6 +145,12 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
                 f"between the axes of upper arm and forearm of a {arm.name}: is it a diameter? Then write "
                 f"{0.5e3 * radius:g}"
             )
+
+
+def _about_joint(begin: Vector, end: Vector, along: Vector, length: float) -> bool:
+    """Tell whether a sheet lies about the joint at an end of a tube, whose axis is y of the mesh's frame."""
+    beside = (math.hypot(x, min(abs(z), abs(z - length))) for x, _, z in (begin, end))
+    return abs(along[1]) > math.cos(_TILT) and max(beside) < _BESIDE
 
 
 def _mesh_frame(link: LinkScene, arm: ArmModel) -> Pose:
