@@ -22,6 +22,7 @@ import json
 import statistics
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -43,9 +44,10 @@ from coneskin.geometry.urdf import UrdfJoint, urdf_joints, urdf_links
 SUFFIXES = (".stl", ".dae", ".obj")
 LEAST_VOLUME = 1.0  # mm3
 LEAST_DEPTH = 1.0  # mm
-SWEEP_STEP = np.radians(5.0)
+SWEEP_STEP, FOLD_STEP = np.radians([5.0, 30.0])  # of the joint to the next link, of the two to the one after it
 CABLE_RADIUS, TIE, CONNECTOR = 1.9, (12.0, 12.0, 5.0), (11.0, 13.0, 6.0)  # mm; boxes across, along, high
 Place = Callable[[Any, Any, Any], np.ndarray]
+Bodies = list[tuple[str, Any]]  #: solids by their names
 
 
 def side_of(sheet: dict[str, Any]) -> Place:
@@ -176,6 +178,8 @@ def shared_volume(one: Any, two: Any) -> float:
 
 def depth_in_link(points: np.ndarray, link: Any) -> float:
     """Return how deep the deepest of some points lies in a link [mm]; 0 for points outside."""
+    if not len(points):
+        return 0.0
     ways = np.array([w for w in itertools.product((-1, 0, 1), repeat=3) if sum(map(abs, w)) in (1, 3)], float)
     ways = ways @ trimesh.transformations.euler_matrix(0.3, 0.5, 0.7)[:3, :3].T
     ways /= np.linalg.norm(ways, axis=1)[:, None]
@@ -219,52 +223,105 @@ def interferences(data: dict[str, Any], link: Any) -> list[str]:
     return [f"{what} ({size:.1f} {'mm' if 'link' in what else 'mm3'})" for what, size in found.items()]
 
 
-def swept(data: dict[str, Any], link: str, joints: Sequence[UrdfJoint], meshes: dict[str, Any]) -> list[str]:
-    """Return which bodies of a link a link beside it meets, in words, over the range of the joint between.
+def ways_from(link: str, joints: Sequence[UrdfJoint], steps: int) -> Iterator[tuple[str, list[tuple[UrdfJoint, bool]]]]:
+    """Yield each link that is at most so many joints away, with the joints between and whether each leads outwards."""
+    ways: list[tuple[str, list[tuple[UrdfJoint, bool]]]] = [(link, [])]
+    for at, way in ways:
+        for joint in joints if len(way) < steps else ():
+            if at not in (joint.parent, joint.child) or any(joint is passed for passed, _ in way):
+                continue
+            outwards = joint.parent == at
+            ways.append((joint.child if outwards else joint.parent, [*way, (joint, outwards)]))
+            yield ways[-1]
+
+
+def poses_along(way: list[tuple[UrdfJoint, bool]]) -> Iterator[np.ndarray]:
+    """Yield the pose of the link at the end of a way [mm], over the ranges of the joints on it."""
+    step = SWEEP_STEP if len(way) < 2 else FOLD_STEP
+    for angles in itertools.product(
+        *(np.linspace(j.lower, j.upper, int((j.upper - j.lower) / step) + 2) for j, _ in way)
+    ):
+        pose = np.eye(4)
+        for (joint, outwards), angle in zip(way, angles, strict=True):
+            place = np.eye(4)
+            place[:3, :3], place[:3, 3] = joint.origin.rotation, 1e3 * np.array(joint.origin.translation)
+            place = place @ trimesh.transformations.rotation_matrix(angle, joint.axis)
+            pose = pose @ (place if outwards else np.linalg.inv(place))
+        yield pose
+
+
+def cloud(solid: Any) -> np.ndarray:
+    """Return the corners of a solid and places on its surface [mm]."""
+    return np.vstack([solid.vertices, trimesh.sample.sample_surface(solid, 500, seed=1)[0]])
+
+
+def swept(link: str, skins: dict[str, Bodies], joints: Sequence[UrdfJoint], meshes: dict[str, Any]) -> list[str]:
+    """Return which bodies of a link meet the next links or their skins over the range of the joint between.
+
+    Two joints away an arm folds onto itself, bare or not: there it is said in how many poses each does.
 
     Args:
-        data: content of the design.json of the link.
         link: its name.
+        skins: the bodies on each link, by their names.
         joints: of the robot.
         meshes: of its links [mm].
     """
     worst: dict[str, float] = {}
-    bodies = [
-        (f"{name} {number}", np.vstack([solid.vertices, trimesh.sample.sample_surface(solid, 500, seed=1)[0]]))
-        for number, sheet in enumerate(data["sheets"], 1)
-        for name, solid in bodies_of(sheet, sheet["thickness_mm"])
-    ]
+    folds = []
+    bodies = [(name, cloud(solid)) for name, solid in skins[link]]
     points = np.concatenate([corners for _, corners in bodies])
     owner = np.repeat(np.arange(len(bodies)), [len(corners) for _, corners in bodies])
-    for joint in joints:
-        other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
+    bare = trimesh.sample.sample_surface(meshes[link], 2000, seed=1)[0]
+    for other, way in ways_from(link, joints, 2):
         if other not in meshes:
             continue
-        low, high = meshes[other].bounds
-        for angle in np.linspace(joint.lower, joint.upper, int((joint.upper - joint.lower) / SWEEP_STEP) + 2):
-            place = np.eye(4)
-            place[:3, :3], place[:3, 3] = joint.origin.rotation, 1e3 * np.array(joint.origin.translation)
-            place = place @ trimesh.transformations.rotation_matrix(angle, joint.axis)
-            moved = trimesh.transform_points(points, np.linalg.inv(place) if link == joint.parent else place)
-            near = np.flatnonzero(((moved > low) & (moved < high)).all(axis=1))
-            for number in np.unique(owner[near]):
-                depth = depth_in_link(moved[near[owner[near] == number]], meshes[other])
-                key = f"{bodies[number][0]} in {other}"
-                worst[key] = max(worst.get(key, 0.0), depth)
-    return [f"{what} ({depth:.1f} mm)" for what, depth in worst.items() if depth > LEAST_DEPTH]
+        solids = {other: meshes[other]}
+        if len(way) == 1:
+            solids |= {f"{name} of {other}": solid for name, solid in skins.get(other, ())}
+        met = Counter[str]()
+        for pose in poses_along(way):
+            back = np.linalg.inv(pose)
+            moved = trimesh.transform_points(points, back)
+            if len(way) > 1:
+                there = depth_in_link(inside(trimesh.transform_points(bare, back), solids[other]), solids[other])
+                skin = depth_in_link(inside(moved, solids[other]), solids[other])
+                met["bare" if there > LEAST_DEPTH else "skin" if skin > LEAST_DEPTH else "none"] += 1
+                continue
+            for what, solid in solids.items():
+                near = np.flatnonzero(((moved > solid.bounds[0]) & (moved < solid.bounds[1])).all(axis=1))
+                for number in np.unique(owner[near]):
+                    depth = depth_in_link(moved[near[owner[near] == number]], solid)
+                    key = f"{bodies[number][0]} in {what}"
+                    worst[key] = max(worst.get(key, 0.0), depth)
+        if met["skin"]:
+            folds.append(f"folded onto {other} in {met['skin']} of {met.total()} poses (bare {met['bare']})")
+    return [f"{what} ({depth:.1f} mm)" for what, depth in worst.items() if depth > LEAST_DEPTH] or ["none", *folds]
+
+
+def inside(points: np.ndarray, solid: Any) -> np.ndarray:
+    """Return the points within the bounds of a solid."""
+    return points[((points > solid.bounds[0]) & (points < solid.bounds[1])).all(axis=1)]
 
 
 def check_robot(robot: Path, skin: Path, **urdf: Any) -> None:
-    """Print what interferes on each link of a robot, and with the links beside it."""
+    """Print what interferes on each link of a robot, and with the links beside it and their skins."""
     meshes = {}
     for name in urdf_links(robot, **urdf):
         mesh = next(load_link(f"{robot}#{name}", **urdf)).mesh
         meshes[name] = trimesh.Trimesh(1e3 * mesh.vertices, mesh.faces, process=False)
     joints = urdf_joints(robot, **urdf)
-    for file in sorted(skin.glob("*/design.json")):
-        data, name = json.loads(file.read_text()), file.parent.name
-        found = interferences(data, meshes[name]) + swept(data, name, joints, meshes)
-        print(f"{name:30s}{len(data['sheets']):7d} sheets  {'; '.join(found) or 'none'}", flush=True)
+    designs = {file.parent.name: json.loads(file.read_text()) for file in sorted(skin.glob("*/design.json"))}
+    skins: dict[str, Bodies] = {
+        name: [
+            (f"{what} {number}", solid)
+            for number, sheet in enumerate(data["sheets"], 1)
+            for what, solid in bodies_of(sheet, sheet["thickness_mm"])
+        ]
+        for name, data in designs.items()
+    }
+    for name, data in designs.items():
+        found = interferences(data, meshes[name]) + swept(name, skins, joints, meshes)
+        print(f"{name:30s}{len(data['sheets']):7d} sheets  {'; '.join(found)}", flush=True)
 
 
 def main() -> None:

@@ -42,7 +42,8 @@ acceleration_deg_s2 = 90
 _MONITORING_TEXT = """\
 [monitoring]                  # a pseudo-terminal on a busy computer can stall for longer than 50 ms"""
 _STALL_MS = 250  # ms
-_LINE_RATE = 2000  # frames a second that a line of 921600 bits a second carries with room to spare
+_LINE_RATE = 600  # frames a second: a pseudo-terminal holds 4096 bytes, as many as these leave in a stall of 190 ms
+_SENSOR_RATE = 100  # frames a second that the guard wants of each sensor
 _TOUCH_START = 2.5  # s after the skin's start: the arm moves at full speed until about 3.4 s
 _TOUCH_END = 2.8  # s
 
@@ -244,7 +245,8 @@ def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
 
 def _virtual(design: DesignFolder, count: int) -> str:
     cone = design.sensors[0].frustum
-    rate = f"rate_hz = {_LINE_RATE // count}               # of each sensor: one line carries them all\n"
+    share = max(_LINE_RATE // count, _SENSOR_RATE)
+    rate = f"rate_hz = {share}               # of each sensor: one line carries them all\n"
     return (
         f'[source]\nkind = "virtual"\n{rate if count > 2 else ""}\n'
         f"[[source.touch]]\nstart_s = {_TOUCH_START:g}\nend_s = {_TOUCH_END:g}\n"
