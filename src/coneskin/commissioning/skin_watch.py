@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _FRAME_TIMEOUT = 30.0  # s that frames may be late or missing: nothing is guarded, and a late place is as good
 _READY_TIMEOUT = 10.0  # s for every sensor to send a run of good frames
 _POLL_PERIOD = 0.02  # s between two looks at what is not skin
+_AGAIN_TIME = 2.0  # s, and the time of two touches, after which a virtual touch that was too short is made again
 
 
 class SkinWatch:
@@ -206,6 +208,7 @@ class TouchSession:
         self._notice, self._reading, self._refused = notice, reading, refused
         self._wired_as = wired_as or scene
         self._client: SkinClient | None = None
+        self._again_at = math.inf  # when a touch of a virtual skin that was not read is made once more
 
     @contextmanager
     def watch(self) -> Iterator[SkinWatch]:
@@ -244,6 +247,8 @@ class TouchSession:
             readings = watch.read(_POLL_PERIOD)
             now = time.monotonic()
             self._tell(judge, touching.update(now, readings), duration)
+            if now >= self._again_at and judge.mark is not None:
+                self._touch(judge, duration)
             if now - polled >= _POLL_PERIOD:
                 polled = now
                 check()
@@ -255,7 +260,12 @@ class TouchSession:
         """Tell the person; a virtual skin is touched in the person's place."""
         for notice in notices:
             self._notice(notice)
-            if self._client is not None and notice.kind in REQUESTS and judge.mark is not None:
-                self._client.touch(*judge.mark.place, judge.force, duration, judge.current.sensor.name)
+            if notice.kind in REQUESTS:
+                self._touch(judge, duration)
             elif self._client is not None and notice.kind == "read":
                 self._client.release()
+
+    def _touch(self, judge: TouchJudge[TouchReading], duration: float) -> None:
+        if self._client is not None and judge.mark is not None:
+            self._client.touch(*judge.mark.place, judge.force, duration, judge.current.sensor.name)
+            self._again_at = time.monotonic() + 2.0 * duration + _AGAIN_TIME

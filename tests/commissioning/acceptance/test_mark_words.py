@@ -86,6 +86,23 @@ def test_the_words_lead_to_the_place_on_a_link_that_is_not_round(q: tuple[float,
         assert math.degrees(math.acos(min(1.0, off @ side / np.linalg.norm(off)))) < 0.1
 
 
+@pytest.mark.parametrize("link", ["upper_arm", "forearm"])
+def test_the_words_lead_to_the_place_on_a_sheet_about_the_joint_at_the_end_of_a_link(link: str) -> None:
+    """Such a sheet has no place along its link: its own ends are named, and the clock is seen along it."""
+    here = scene(link, "xyz_mm = [0, 130, 0]\nrpy_deg = [90, 0, 0]")
+    (placed,), (item,) = place_sensors(here), here.sensors
+    found = offer_marks(item.sensor, placed, START)
+    assert len({mark.where for mark in found}) == len(found) >= 9
+    first, last = (np.array(placed.place_in_base(u, 1.0, START)[0]) for u in (0.0, item.sensor.frustum.slant))
+    along = (last - first) / np.linalg.norm(last - first)
+    for mark in found:
+        said = re.match(rf"(\d+) mm from electrode B \(end 1\), about the end of the {link}, at ", mark.where)
+        assert said, mark.where
+        assert 1e-3 * int(said[1]) == pytest.approx(mark.u, abs=6e-4)
+        normal = np.array(placed.place_in_base(mark.u, mark.phi, START)[1])
+        assert normal @ clock_side(mark.where, along) == pytest.approx(1.0, abs=1e-3)
+
+
 @pytest.mark.long
 @settings(max_examples=20, deadline=None)
 @given(

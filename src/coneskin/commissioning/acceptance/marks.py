@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import power, shifts
 from coneskin.commissioning.touching import Mark
-from coneskin.robot.arm.vectors import added, cross, scaled
+from coneskin.robot.arm.vectors import added, cross, dot, minus, scaled
 from coneskin.scene.build import place_on_arm
 from coneskin.scene.commissioning_record import MIN_MARKS
 
@@ -72,6 +72,8 @@ def plan_marks(
 
 #: [i]: where link i begins
 _JOINT_NAMES = ("the floor", "the base", "the shoulder", "the elbow", "wrist 1", "wrist 2", "wrist 3", "the flange")
+_SHEET_ENDS = ("electrode B (end 1)", "electrode A (end 2)")
+_ALONG_COSINE = 0.5  # of the angle between a sheet's axis and its link, below which the sheet does not lie along it
 _TUBE_LINKS = (2, 3)  # links whose mesh begins on their joint's axis and runs along the link
 _CLOCK_STEPS = (30.0, 15.0, 7.5, 3.75)  # deg; an hour of the clock, and parts of one
 _MIN_OFFERED = 9  # marks to choose from
@@ -111,7 +113,7 @@ def _on_sheet(sensor: Sensor, step: float) -> list[Mark]:
             phi = math.radians(number * step)
             if margin <= phi <= cone.wrap - margin:
                 arc = 1e3 * cone.radius_at(u) * phi
-                where = f"{1e3 * u:.0f} mm from electrode B (end 1) and {arc:.0f} mm along the arc from electrode D"
+                where = f"{1e3 * u:.0f} mm from {_SHEET_ENDS[0]} and {arc:.0f} mm along the arc from electrode D"
                 marks.append(Mark(u, phi, where))
     return marks
 
@@ -122,16 +124,20 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
     assert placed.model is not None
     cone, poses = sensor.frustum, link_poses(placed.model, q)
     base_link, joint = poses[placed.link], poses[max(placed.link - 1, 0)].translation  # at which the link begins
+    link = minus(base_link.translation, joint)
     ends = [base_link.apply(placed.frustum.centre(u)) for u in (0.0, cone.slant)]
     axis = scaled(added(ends[1], scaled(ends[0], -1.0)), 1.0 / math.dist(*ends))
-    from_end1 = math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
+    crosswise = abs(dot(axis, link)) < _ALONG_COSINE * math.hypot(*link)  # about the axis of the joint at its end
+    from_end1 = crosswise or math.dist(joint, ends[0]) <= math.dist(joint, ends[1])
     along = axis if from_end1 else scaled(axis, -1.0)  # from the joint nearer the base to the farther one
     twelve, reference = _twelve(along)
     right = cross(along, twelve)
-    near, far = _JOINT_NAMES[placed.link], _JOINT_NAMES[placed.link + 1]
+    near, far, way = _JOINT_NAMES[placed.link], _JOINT_NAMES[placed.link + 1], f"along the {placed.link_name}"
+    if crosswise:
+        near, far, way = _SHEET_ENDS[0], _SHEET_ENDS[1], f"about the end of the {placed.link_name}"
     margin, marks = _azimuth_margin(sensor), []
     for u in _rounded(sensor, placed, placed.model):
-        distance = _distance(sensor, placed, placed.model, u, from_end1, near)
+        distance = f"{1e3 * u:.0f} mm from {near}" if crosswise else _distance(sensor, placed, u, from_end1, near)
         azimuth = _azimuths(placed, u)
         for number in range(round(360.0 / step)):
             angle = math.radians(number * step)
@@ -139,7 +145,7 @@ def _on_arm(sensor: Sensor, placed: SensorOnArm, q: Sequence[float], step: float
             phi = azimuth(base_link.inverse().rotate(side))
             if margin <= phi <= cone.wrap - margin:
                 where = (
-                    f"{distance}, along the {placed.link_name}, at {_clock(angle)} as seen from {near} towards {far} "
+                    f"{distance}, {way}, at {_clock(angle)} as seen from {near} towards {far} "
                     f"(12:00 is {reference}): the side that points {_direction(side)}"
                 )
                 marks.append(Mark(u, phi, where))
@@ -196,9 +202,9 @@ def _rounded(sensor: Sensor, placed: SensorOnArm, model: ArmModel) -> list[float
     ]
 
 
-def _distance(sensor: Sensor, placed: SensorOnArm, model: ArmModel, u: float, from_end1: bool, near: str) -> str:
-    if placed.link in _TUBE_LINKS:
-        return f"{1e3 * _from_joint(placed, model, u):.0f} mm from the axis of {near}"
+def _distance(sensor: Sensor, placed: SensorOnArm, u: float, from_end1: bool, near: str) -> str:
+    if placed.link in _TUBE_LINKS and placed.model is not None:
+        return f"{1e3 * _from_joint(placed, placed.model, u):.0f} mm from the axis of {near}"
     edge = u if from_end1 else sensor.frustum.slant - u
     return f"{1e3 * edge:.0f} mm from the edge of the sheet's active area that is nearer {near}"
 
