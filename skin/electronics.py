@@ -226,8 +226,8 @@ def match_electronics(radial_ohms: float, angular_ohms: float, given: GivenElect
     """Choose the electronics for a sensor; none is ever refused here.
 
     * Supply: the largest reference within 80 % of the converter's range with which neither sheet draws more than 50 mA.
-    * Full scale of the current: the E96 shunt that gives the least range above 2.2 times the larger drive current (under
-      1 ohm an E24 one).
+    * Full scale of the current: the shunt of E96, under 1 ohm of E24, that gives the least range above 2.2 times the
+      larger drive current.
     * Bits: 12, or as many up to 16 as give the smaller drive current 100 counts.
     * Pull-downs: the E24 value from twice the larger sheet resistance on, 10 to 100 kohm.
 
