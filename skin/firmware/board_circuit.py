@@ -13,6 +13,7 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
@@ -265,6 +266,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     return BoardCircuit(board, facts, fitted, shunt, resistor, other)
 
 
+@cache
 def part_catalog() -> dict[str, Any]:
     """Return the tables of parts.toml by name; pins as the numbers of their pads."""
     catalog = tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))

@@ -66,6 +66,11 @@ def sheets_of(sensor: Sensor, ratio: float) -> Array:
     return np.array(FieldContacts().admittances(other, scenes))
 
 
+@cache
+def _circuit(name: str, converter: str) -> BoardCircuit:
+    return board_circuit(name, FOREARM, converter)
+
+
 def _drawn(rng: np.random.Generator, pair: list[float]) -> float:
     """A value within +- the worst of a pair, a third of it as deviation."""
     return float(np.clip(rng.normal(0.0, pair[1] / 3.0), -pair[1], pair[1]))
@@ -197,7 +202,7 @@ def judge(
         hour: run the hour as well.
     """
     rng = np.random.default_rng([seed, *name.encode(), *converter.encode()])
-    circuit = board_circuit(name, FOREARM, converter)
+    circuit = _circuit(name, converter)
     sensor = circuit.sensor
     volts, values, three = volts_seen(circuit, rng, offset)
     read = esp32_curve(rng) if esp32 else curve_of(circuit, rng, three)
