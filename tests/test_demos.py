@@ -19,7 +19,7 @@ def play(name: str) -> str:
         [sys.executable, "-W", "error", str(DEMOS / name), *ARGUMENTS.get(name, [])],
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=300,
     )
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout

@@ -91,7 +91,7 @@ class ArmSupervisor:
         self._rules = rules
         self._touches = TouchRecord(rules)
         self._speed_limit = speed_limit
-        self.speed_reduction = SpeedReduction(model, self._needs_slider)
+        self.speed_reduction = SpeedReduction(model, self._needs_slider, limits.arm_silence)
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
@@ -262,7 +262,7 @@ class ArmSupervisor:
             ):
                 self._follow(state.time, Cue.FAULTED, why, out)
         elif phase is Phase.SLOWED:
-            self.speed_reduction.sample(state, self._touches.contacts)
+            self.speed_reduction.sample(state, measured_at, self._touches.contacts)
         elif stop.watch.moved(state, bool(self._touches.contacts)):
             self._follow(state.time, Cue.MOVED, stop.watch.why, out)
         elif phase is Phase.PLACING:
@@ -284,7 +284,7 @@ class ArmSupervisor:
             self.speed_reduction.note_stop(stop.used)
         elif phase is Phase.SLOWED:
             slowed = self.speed_reduction.now
-            if why := self.speed_reduction.poll(now, bool(self._touches.contacts)):
+            if why := self.speed_reduction.poll(now, fair, bool(self._touches.contacts)):
                 contact = self._touches.find(0 if slowed is None else slowed.approach.exceeded)
                 self._follow(now, Cue.FAULTED, why, out, contact)
             elif slowed is None or slowed.over(now):

@@ -33,7 +33,7 @@ _FALL_TIME = 0.05  # s in which the level has to fall by _MIN_FALL, again and ag
 _MIN_FALL = 0.01  # of the level; six times its noise, and above 20 N what half the force is
 _MAX_RISE = 0.01  # of the level, above the least since the surface moved away
 _MAX_JUMP = 0.02  # m along the skin; a fingertip rolls by less
-_MAX_DOUBT = 0.004  # s for which a firm touch may be without a certain place; one that ends is for a few frames
+_MAX_DOUBT = 0.004  # s for which a firm touch may be without a certain place, and a frame; one that ends is for a few
 _SAME_SIDE = 0.5  # cosine; normals farther apart than 60 deg may hold the arm between them
 
 
@@ -48,7 +48,9 @@ class _Watched:
     lowest: float
     window: float | None = None  # when the level was last found to have fallen [s]
     level: float = 0.0  # then
-    doubted: float | None = None  # since when its place is not certain [s]
+    doubted: tuple[float, ContactOnLink] | None = (
+        None  # since when its place is not certain [s], and what was seen then
+    )
 
 
 class ContactSupervision:
@@ -98,8 +100,9 @@ class ContactSupervision:
                 watched.point = contact.point
         elif contact.level >= contact.firm:
             if watched.doubted is None:
-                watched.doubted = time
-            if time - watched.doubted >= _MAX_DOUBT and not self._complying:
+                watched.doubted = time, contact
+            since, first = watched.doubted
+            if time - since >= _MAX_DOUBT and contact != first and not self._complying:  # by another frame, too
                 return "the place of the touch is not certain any more"
         return ""
 

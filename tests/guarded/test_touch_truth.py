@@ -26,9 +26,10 @@ height_mm = 434
 [source]
 kind = "virtual"
 model = "ladder"
+rate_hz = 200
 [[source.touch]]
-start_s = 0.4
-end_s = 0.5
+start_s = 1.5
+end_s = 2.0
 u_mm = 200
 phi_deg = 90
 [monitoring]
@@ -42,14 +43,14 @@ def test_the_script_and_the_programs_touches_are_recorded_as_they_were(tmp_path:
     with guard(parse_scene(SCENE), recording=tmp_path / "run.rec") as session:
         assert session.wait_for((EventName.TOUCH_ENDED,), DEADLINE) is not None
         seen = len(session.events)
-        began = session.touch(0.1, 2.0, duration=0.1)
+        began = session.touch(0.1, 2.0, duration=0.5)
         assert session.wait_for((EventName.TOUCH_ENDED,), DEADLINE, after=seen) is not None
     run = read_run(tmp_path / "run.rec")
     assert run.start == session.began
     touches = _true_touches(run)
     assert touches is not None
     assert [one.sensor for one in touches] == ["skin", "skin"]
-    assert [one.end - one.start for one in touches] == pytest.approx([0.1, 0.1])
+    assert [one.end - one.start for one in touches] == pytest.approx([0.5, 0.5])
     assert touches[1].start == pytest.approx(began - run.start)
     (row,) = judge_run(tmp_path / "run.rec")
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 2, 0, 0)

@@ -87,7 +87,7 @@ def run(program, tmp_path):
         (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
         command = [sys.executable, str(program), simulated.host]
         with Way(simulated.host) as way:
-            done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=90)
+            done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout, simulated.events(), way.points()
 

@@ -92,11 +92,11 @@ def test_each_time_that_a_guard_hangs_it_is_missed_anew(channel, watchdog, monke
     emit(theirs, "activated")
     for count in (1, 2):
         seen = len(log.events)
-        assert "has sent nothing" in log.wait_for(("guard_unresponsive",), 5.0, after=seen).details["what"]
+        assert "has sent nothing" in log.wait_for(("guard_unresponsive",), 60.0, after=seen).details["what"]
         watchdog[1].send(encode_json({"stands": True}))
         until(lambda count=count: len(fallback_stops(log)) == count)
         emit(theirs, "latched")
-        assert log.wait_for(("latched",), 5.0, after=seen) is not None
+        assert log.wait_for(("latched",), 60.0, after=seen) is not None
     emit(theirs, "ending")
     theirs.close()
     monitor.close()
@@ -120,7 +120,7 @@ def test_a_guard_is_missed_whatever_a_program_does_with_the_events(channel):
     ours, theirs = channel
     log, monitor = monitored(ours)
     emit(theirs, "activated")
-    assert log.wait_for(("activated",), 5.0) is not None
+    assert log.wait_for(("activated",), 60.0) is not None
     log.events.clear()
     theirs.close()
     until(lambda: log.ended)
@@ -139,7 +139,7 @@ def test_what_is_wrong_with_the_skins_line_is_said_while_the_guard_waits(channel
     emit(theirs, "guard_exited", what="done")
     theirs.flush()
     monitor = GuardMonitor(log, ours, (), lambda why: f"the checksum, because {why[0]}")
-    assert log.wait_for(("guard_exited",), 5.0)
+    assert log.wait_for(("guard_exited",), 60.0)
     theirs.close()
     monitor.close()
     lines = [event.details["what"] for event in log.events if event.name == "skin_line"]

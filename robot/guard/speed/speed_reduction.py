@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # a scene without a slow reaction does not load it
 CLEAR_TIME = 0.5  #: s without a touch after which the arm goes on at the speed it had
 _MAX_SPEED_RATIO = 0.9  # ratio; speed after the reduction to speed at the touch
 _SLIDER_TOLERANCE = 0.02  # ratio; allowed difference of the slider from its setting
-_MAX_SLIDER_AGE = 0.5  # s; it is read 50 times a second
+_MAX_SLIDER_AGE = 0.5  # s, or as long as the controller may be silent; it is read 50 times a second
 
 
 class _ReducedSpeedTouch:
@@ -52,11 +52,12 @@ class _ReducedSpeedTouch:
         self.approach, self.torque, self.resistance = approach, torque, resistance
         self.held = ""  # why the arm counts as held by something
         self.free_since: float | None = None
+        self.newest = -math.inf  # when the newest sample was measured [s]
         self.fast = 0  # samples in a row
 
     def sample(self, time: float, speed: float, certain: bool = True) -> None:
-        """Take the measured speed of the touched surface at a time [s, m/s]. ``certain`` where it is no bound."""
-        top = self.top
+        """Take the speed of the touched surface as measured at a time [s, m/s]. ``certain`` where it is no bound."""
+        top, self.newest = self.top, time
         if time < self.deadline and speed > top[certain]:
             top[certain] = speed  # it may still have been speeding up
         self.fast = self.fast + 1 if speed > max(_MAX_SPEED_RATIO * top[certain], self.slow) else 0
@@ -70,14 +71,13 @@ class _ReducedSpeedTouch:
 
     def trouble(self, now: float, slider: float | None) -> str:
         """Return why the arm has to be stopped after all, by where the slider is. Empty where it has not."""
-        if now >= self.deadline:
-            if self.fast >= STANDSTILL_SAMPLES:
-                return "the arm did not become slower"
-            if self.free_since is None and slider is not None and slider > self.fraction + _SLIDER_TOLERANCE:
-                return f"the speed slider is at {slider:.0%} again while the skin is touched"
-        if self.free_since is None and now >= self.end:
-            return "the touch lasts too long"
-        return ""
+        if self.newest >= self.deadline and self.fast >= STANDSTILL_SAMPLES:  # late states show what was, not what is
+            return "the arm did not become slower"
+        if self.free_since is not None:
+            return ""
+        if now >= self.deadline and slider is not None and slider > self.fraction + _SLIDER_TOLERANCE:
+            return f"the speed slider is at {slider:.0%} again while the skin is touched"
+        return "the touch lasts too long" if now >= self.end else ""
 
     def puts_back(self, slider: float | None) -> bool:
         """Tell whether the slider is where it was set, or not yet seen there, so that no person has moved it since."""
@@ -96,14 +96,16 @@ class SpeedReduction:
     Args:
         model: the arm.
         used: True where a reaction of the scene slows the arm.
+        silence: longest time for which the controller may be silent [s].
 
     Attributes:
         slider: where the controller's speed slider was last. None where that is not known.
         now: the touch that is under way, or None.
     """
 
-    def __init__(self, model: ArmModel, used: bool) -> None:
+    def __init__(self, model: ArmModel, used: bool, silence: float) -> None:
         self._model = model
+        self._max_age = max(_MAX_SLIDER_AGE, silence)
         if used:  # here, so that no touch waits for it
             from coneskin.robot.guard.signals.joint_current import OutsideTorque, ResistanceMonitor
             from coneskin.robot.reaction.contact_supervision import ContactApproach
@@ -123,7 +125,7 @@ class SpeedReduction:
 
     def known(self, time: float) -> float | None:
         """Return the position of the slider. None where it is not known at a time [s]."""
-        return self.slider if time - self._read_at <= _MAX_SLIDER_AGE else None
+        return self.slider if time - self._read_at <= self._max_age else None
 
     def begin(
         self,
@@ -168,19 +170,19 @@ class SpeedReduction:
         emit(out, EventName.SPEED_REDUCED, time, slider=self.now.fraction, before=before)
         return True
 
-    def sample(self, state: ControllerState, contacts: Sequence[ContactOnLink]) -> None:
-        """Take a measured state, and the touches there are by their newest frames."""
+    def sample(self, state: ControllerState, measured_at: float, contacts: Sequence[ContactOnLink]) -> None:
+        """Take a state, when it was measured [s], and the touches there are by their newest frames."""
         if (touch := self.now) is None:
             return
         touch.approach.update(state.q, state.qd, contacts)
-        touch.sample(state.time, touch.approach.speed, touch.approach.certain)
+        touch.sample(measured_at, touch.approach.speed, touch.approach.certain)
         if contacts and not touch.held:
             touch.torque.feed(state, False)
             if touch.torque.now is not None:
                 touch.held = touch.resistance.resistance(state.q, contacts)
 
-    def poll(self, time: float, touched: bool) -> str:
-        """Return why the arm has to be stopped after all. Empty where it has not."""
+    def poll(self, time: float, fair: float, touched: bool) -> str:
+        """Return why the arm has to be stopped after all, as `ArmSupervisor.poll` says. Empty where it has not."""
         if (touch := self.now) is None:
             return ""
         touch.touched(time, touched)
@@ -188,7 +190,7 @@ class SpeedReduction:
             return f"while slow, the surface would move {1e3 * touch.approach.way:.1f} mm into the touch"
         if touch.held:
             return f"while slow, {touch.held}"
-        if self.known(time) is None:
+        if self.known(fair) is None:
             return "the controller does not report its speed slider any more"
         return touch.trouble(time, self.slider)
 

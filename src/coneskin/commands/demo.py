@@ -22,6 +22,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,7 +63,7 @@ xyz_mm = [0, -0.4, 100]
 
 [source]
 kind = "virtual"
-rate_hz = 500
+rate_hz = 200                 # as a board's firmware sends
 
 [reaction]
 kind = "{reaction}"
@@ -121,10 +122,8 @@ def _hold_up(blocks: Iterable[Block]) -> str:
     held = [f"{name} for {1e3 * late:.0f} ms" for name, late in longest.items() if late > _MAX_DELAY]
     if not held:
         return ""
-    return (
-        f"this computer was too busy: it held up {', '.join(held)} ({1e3 * _MAX_DELAY:.0f} ms are as much as a guard "
-        "should bear); end what else it does, and run the demo again"
-    )
+    limit = f"{1e3 * _MAX_DELAY:.0f} ms are as much as a guard should bear"
+    return f"this computer was too busy: it held up {', '.join(held)} ({limit})"
 
 
 def _collision_facts(run: Run, touched: float) -> dict[str, Any]:
@@ -189,6 +188,8 @@ _EVENT_TIMEOUT = 2.0  # s for an event that has happened to be printed
 _MOVE_TIME = 10.0  # s, in which the arm would have arrived
 _CHECK_PERIOD = 0.02  # s
 _PRIMARY_PORT = 30001  # takes URScript
+_MAX_ATTEMPTS = 3  # where this computer holds the demo up
+_BUSY_REMEDY = "end what else it does, and run the demo again"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -227,36 +228,36 @@ def run(args: argparse.Namespace) -> int:
         say(f"a URScript program moves the arm, because ur-rtde is not installed: {wheel_remedy()}")
     if scene.moves_away:
         _commission(scene, say)
-    try:
-        touched = _touch_by_script(scene, folder, say)
-    except ConeSkinError as exc:
-        if cause := _cause(folder):
-            raise RobotRefused(f"{cause}. What followed: {exc}") from exc
-        raise
-    recorded = read_run(folder)
-    again = recorded.replay()
-    facts = _collision_facts(recorded, touched)
-    facts["same_in_replay"] = again.same
+    for left in reversed(range(_MAX_ATTEMPTS)):
+        cause = ""
+        try:
+            touched = _touch_by_script(scene, folder, say)
+        except ConeSkinError as exc:
+            with suppress(RecordingError):  # which tells what held the run up, where there is one
+                cause = _hold_up(read_run(folder).blocks)
+            if not cause:
+                raise
+            if not left:
+                raise RobotRefused(f"{cause}; {_BUSY_REMEDY}. What followed: {exc}") from exc
+        else:
+            recorded = read_run(folder)
+            facts = {**_collision_facts(recorded, touched), "same_in_replay": recorded.replay().same}
+            as_it_should = facts["standstill_ms"] is not None and facts["same_in_replay"] and facts["contacts"] == 1
+            if not as_it_should or facts["cut_short"]:
+                cause = _hold_up(recorded.blocks)
+        if not cause or not left:
+            break
+        print(f"coneskin demo: {cause}; the arm is touched again", file=sys.stderr)
+        (folder / "run.rec").unlink()
     facts["picture"] = _draw(recorded, folder, say)
     (folder / "summary.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
     if args.json:
         print(json.dumps({**facts, "folder": str(folder)}))
     else:
         _print_report(facts, folder, recorded.missing)
-    as_it_should = facts["standstill_ms"] is not None and again.same and facts["contacts"] == 1
-    if (not as_it_should or facts["cut_short"]) and (cause := _hold_up(recorded.blocks)):
-        print(f"coneskin demo: {cause}", file=sys.stderr)
+    if cause:
+        print(f"coneskin demo: {cause}; {_BUSY_REMEDY}", file=sys.stderr)
     return 0 if as_it_should else 1
-
-
-def _cause(folder: Path) -> str:
-    """Return what held the run up, by its recording; empty where nothing did, or none tells."""
-    from coneskin.runs.replay.run import read_run
-
-    try:
-        return _hold_up(read_run(folder).blocks)
-    except RecordingError:
-        return ""
 
 
 class _Transcript:

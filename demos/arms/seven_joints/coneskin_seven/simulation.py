@@ -78,7 +78,21 @@ def serve(host: str, swing: bool) -> None:
     print(f"ready at {host}", flush=True)
     due, turn_at = time.monotonic() + _CYCLE, time.monotonic() + _SWING[1] / 2.0
     while True:
-        for key, _ in selector.select(max(0.0, due - time.monotonic())):
+        ready = selector.select(max(0.0, due - time.monotonic()))
+        now = time.monotonic()
+        while due <= now:  # what a busy computer has held up is made good before what is asked now: its clock is true
+            due += _CYCLE
+            if swing and simulation.running and due >= turn_at:
+                turn_at += _SWING[1]
+                simulation.target = [-speed for speed in simulation.target]
+            simulation.step()
+            for reader in list(readers):
+                try:
+                    reader.send(simulation.state())
+                except OSError:
+                    readers.remove(reader)
+                    reader.close()
+        for key, _ in ready:
             sock = key.fileobj
             assert isinstance(sock, socket.socket)
             if sock in listeners:
@@ -103,19 +117,6 @@ def serve(host: str, swing: bool) -> None:
             *lines, rests[sock] = (rests[sock] + data).split(b"\n")
             for line in lines:
                 sock.send(simulation.answer(line.decode("ascii", "replace")).encode() + b"\n")
-        now = time.monotonic()
-        while due <= now:  # what a busy computer has held up is made good: the clock of the arm is a true one
-            due += _CYCLE
-            if swing and simulation.running and due >= turn_at:
-                turn_at += _SWING[1]
-                simulation.target = [-speed for speed in simulation.target]
-            simulation.step()
-            for reader in list(readers):
-                try:
-                    reader.send(simulation.state())
-                except OSError:
-                    readers.remove(reader)
-                    reader.close()
 
 
 if __name__ == "__main__":

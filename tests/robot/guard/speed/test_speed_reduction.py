@@ -68,9 +68,26 @@ def test_trouble_at_the_budget_where_it_does_not():
     for speed in (1.0, 1.2, 1.1):  # it was still speeding up: a tenth of the top is what counts
         fast(one, 10.1, speed)
     assert one.trouble(10.199, 0.2) == ""
+    fast(one, 10.2, 1.1)
     assert one.trouble(10.2, 0.2) == "the arm did not become slower"
-    one.sample(10.2, 1.07)
+    one.sample(10.21, 1.07)
     assert one.trouble(10.3, 0.2) == ""
+
+
+def test_no_trouble_by_states_from_before_the_budget_that_a_busy_computer_reads_after_it():
+    one = slowing()
+    fast(one, 10.199, 1.0)
+    assert one.trouble(10.9, 0.2) == ""
+    one.sample(10.2, 1.0)
+    assert one.trouble(10.9, 0.2) == "the arm did not become slower"
+
+
+def test_a_slider_is_known_for_as_long_as_the_controller_may_be_silent():
+    for silence, age in ((0.05, 0.5), (1.0, 1.0)):
+        reduction = SpeedReduction(arm_model("UR5e"), used=False, silence=silence)
+        reduction.feed(10.0, 0.7)
+        assert reduction.known(10.0 + age) == 0.7
+        assert reduction.known(10.001 + age) is None
 
 
 def test_a_slow_arm_need_not_become_slower():
@@ -108,7 +125,7 @@ def test_the_slider_is_never_raised():
 
 def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     """The newest reading may be from before the stop: it must not look as if the slider were still where it was."""
-    reduction, out = SpeedReduction(arm_model("UR5e"), used=True), []
+    reduction, out = SpeedReduction(arm_model("UR5e"), used=True, silence=0.05), []
     state = ControllerState(10.0, 1.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), ZERO_VELOCITY, True, False, True)
     reduction.feed(10.0, 1.0)
     assert reduction.begin(10.0, state, Reaction(kind="slow", slow_to=0.2), MonitoringLimits(), [], out)
