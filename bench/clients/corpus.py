@@ -6,7 +6,8 @@ FOLDER has folders of ``.script`` files, which are others' and stay outside this
 Robots' script manual, their URScript_Examples (GitHub), exports of PolyScope, each with its ``.urp``. Each program runs
 by itself, as fast as it goes, for so long of its controller's time. A file without a program around it, as a Script
 node has one, is run as PolyScope does: as the body of a program. What a program asks for and is not there, as a server,
-it meets as on a robot that stands alone. It runs where it is neither refused nor aborted; a protective stop is told.
+it meets as on a robot that stands alone, in a network of its own where that can be had (bench `ur-clients`). It runs
+where it is neither refused nor aborted; a protective stop is told.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ from coneskin.robot.sim.ports.rtde import RtdeOutputs
 from coneskin.robot.sim.ports.user_interface import ProgramFolder
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
+
+from .trials import enter_own_network
 
 _ARMS = ("UR5e", "UR10e", "UR3e", "UR3", "UR5", "UR10", "UR16e", "UR20")
 
@@ -93,6 +96,7 @@ def main() -> int:
     paths = sorted(args.folder.glob("*/**/*.script"))
     if not paths:
         parser.error(f"{args.folder} has no folder with .script files")
+    enter_own_network()
     found = [run(args.folder, path, args.seconds) for path in paths]
     if args.json:
         print(json.dumps([one._asdict() for one in found]))
