@@ -125,7 +125,9 @@ inline void converter_begin() {
   SPI.beginTransaction(SPISettings(8000000, MSBFIRST, SPI_MODE0));
 }
 
+// However fast the board: high for the 3.5 us that a conversion takes at most, low for the 16 bits (8 MHz of 40 allowed).
 inline uint16_t ltc_transfer(uint16_t command) {
+  delayMicroseconds(4);
   digitalWrite(SELECT_PIN, LOW);
   return SPI.transfer16(command);
 }
@@ -137,7 +139,6 @@ inline uint16_t converter_read(uint8_t channel) {
   ltc_transfer(command);
   delayMicroseconds(5);  // 1 kohm and 470 pF, from the channel before: 10 time constants
   digitalWrite(SELECT_PIN, HIGH);
-  delayMicroseconds(4);  // the conversion takes 3.5 us at most
   const uint16_t value = ltc_transfer(command);
   digitalWrite(SELECT_PIN, HIGH);
   return value;

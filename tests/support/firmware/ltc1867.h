@@ -17,8 +17,9 @@ static const double LTC_TIME = 3.5e-6; /* s that a conversion takes at most */
 static int ltc_input(const Ltc *chip) { return (chip->command >> 4 & 3) * 2 + (chip->command >> 6 & 1); }
 
 static void ltc_fall(Ltc *chip, double now) {
-  chip->low = 1, chip->bytes = 0;
-  chip->shifted = now - chip->began < LTC_TIME ? 0xAAAA : chip->result; /* nonsense where it was not awaited */
+  const int early = now - chip->began < LTC_TIME; /* then it says nonsense and takes no word: the worst that could be */
+  chip->low = 1, chip->bytes = 2 * early;
+  chip->shifted = early ? 0xAAAA : chip->result;
 }
 
 /* Take a byte, and return the one that comes out meanwhile. */
