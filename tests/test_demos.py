@@ -13,14 +13,21 @@ DEMOS = ROOT / "demos"
 ARGUMENTS = {"04_guard_a_program.py": ["127.0.0.44" if sys.platform.startswith("linux") else "127.0.0.1"]}
 
 
-def play(name: str) -> str:
-    """Run a demo and return what it prints; it must end well and complain of nothing."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(DEMOS / name), *ARGUMENTS.get(name, [])],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+def play(name: str, attempts: int = 1) -> str:
+    """Run a demo and return what it prints; it must end well and complain of nothing.
+
+    Args:
+        attempts: how often it may end because this computer is too busy for a guard, as its last words are then.
+    """
+    for _ in range(attempts):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", str(DEMOS / name), *ARGUMENTS.get(name, [])],
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
+        if "busy" not in done.stderr:
+            break
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
 
@@ -29,7 +36,7 @@ def test_the_demos_are_numbered_and_all_are_tested_here() -> None:
     names = sorted(path.name for path in DEMOS.glob("*.py"))
     assert [name[:3] for name in names] == [f"{n:02}_" for n in range(1, len(names) + 1)]
     source = Path(__file__).read_text(encoding="utf-8")
-    assert all(f'play("{name}")' in source for name in names)
+    assert all(f'play("{name}"' in source for name in names)
 
 
 def test_unroll() -> None:
@@ -64,7 +71,7 @@ def test_virtual_skin() -> None:
 def test_guard_a_program() -> None:
     pytest.importorskip("rtde_control", reason="ur-rtde is not installed")
     for _ in range(10):
-        out = play("04_guard_a_program.py")
+        out = play("04_guard_a_program.py", attempts=5)
         if "retreating" in out:  # else what the arm would be moved away by came too late: this computer is busy
             break
     place = re.match(r"Collision: sensor 0/0 on the forearm was touched at u = ([\d.]+) mm, phi = ([\d.]+) deg", out)

@@ -170,7 +170,7 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
             asked = {"RTDE": b"\0\5V\0\2", "interpreter": b"statelastexecuted\n"}  # protocol version 2; a command
             said = {}
             for name, port in facts["ports"].items():
-                with socket.create_connection((facts["host"], port), 5.0) as sock:
+                with socket.create_connection((facts["host"], port), 60.0) as sock:
                     sock.sendall(asked.get(name, b""))
                     said[name] = sock.recv(4)
         finally:
@@ -232,7 +232,7 @@ def test_the_simulated_controller_is_a_distribution_of_its_own(tmp_path: Path) -
         "from sim_ur import SimulatedController\n"
         "from sim_ur.robot.sim.process import free_host\n"
         "with SimulatedController('UR8 Long', free_host()) as controller:\n"
-        "    with socket.create_connection((controller.host, 30004), timeout=5) as rtde:\n"
+        "    with socket.create_connection((controller.host, 30004), timeout=60) as rtde:\n"
         "        rtde.sendall(bytes([0, 5, 86, 0, 2]))\n"
         "        assert rtde.recv(9) == bytes([0, 4, 86, 1])\n"
         "    assert controller.state()['safety'] == 'NORMAL'\n"

@@ -66,7 +66,7 @@ def external(simulated, changes=None):
 
 
 def send(host, port, text):
-    with socket.create_connection((host, port), 5.0) as sock:
+    with socket.create_connection((host, port), DEADLINE) as sock:
         sock.sendall(text.encode())
         if port == 29999:
             with sock.makefile() as lines:  # one reader: its buffer may hold both lines

@@ -56,7 +56,7 @@ class Way:
     def _read(self):
         with StateReader(self._host) as reader:
             while not self._done.is_set():
-                self.q.append(reader.wait(5.0).q)
+                self.q.append(reader.wait(60.0).q)
 
     def points(self):
         """Where the flange was, one point for each 0.5 mm of the way."""

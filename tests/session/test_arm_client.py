@@ -47,11 +47,11 @@ def test_a_thread_that_waits_for_a_move_does_not_keep_the_answer_of_another(ends
     number = asked(driver)["number"]
     second = call(lambda: requests.do(do="stop"), stopped)
     answer(driver, asked(driver)["number"], what="stop")
-    second.join(5.0)
+    second.join(60.0)
     assert [(one["what"]) for one in stopped] == ["stop"]
     assert moved == []
     answer(driver, number, what="move")
-    first.join(5.0)
+    first.join(60.0)
     assert [(one["what"]) for one in moved] == ["move"]
 
 
@@ -66,7 +66,7 @@ def test_a_request_that_was_held_up_until_it_was_void_is_sent_again_while_its_ca
     assert again["number"] != first["number"]
     assert again["sent"] >= first["sent"]
     answer(driver, again["number"], what="move")
-    thread.join(5.0)
+    thread.join(60.0)
     assert [one["what"] for one in moved] == ["move"]
 
 
@@ -89,13 +89,13 @@ def test_answers_that_nobody_waits_for_any_more_are_not_kept(ends) -> None:
     thread = call(ask, [])
     number = asked(driver)["number"]
     gone.append(True)
-    thread.join(5.0)
+    thread.join(60.0)
     assert len(raised) == 1
     answer(driver, number)
     gone.clear()
     thread = call(lambda: requests.do(do="again"), raised)
     answer(driver, asked(driver)["number"], what="again")
-    thread.join(5.0)
+    thread.join(60.0)
     assert raised[1]["what"] == "again"
     assert requests._answers == {}
 
@@ -155,7 +155,7 @@ def test_a_way_point_may_be_slow_and_the_last_has_no_blend(ends) -> None:
     thread = call(lambda: arm.move_path([Waypoint.move_j([0.0] * 6, blend=0.1)] * 2), [])
     request = asked(driver)
     answer(driver, request["number"])
-    thread.join(5.0)
+    thread.join(60.0)
     assert [point[-1] for point in request["waypoints"]] == [0.1, 0.0]
 
 
@@ -173,7 +173,7 @@ def test_a_request_that_is_too_long_is_refused_and_not_waited_for(ends) -> None:
     requests = _ArmRequests(program, lambda stopped: None)
     asking = threading.Thread(target=ask, daemon=True)
     asking.start()
-    asking.join(5.0)
+    asking.join(60.0)
     program.hang_up()
     assert len(refused) == 1
     assert "move_path: the driver process does not take 50000" in refused[0]

@@ -238,7 +238,7 @@ def test_no_client_ends_the_server() -> None:
                 server._publish()
 
         for name, (port, data) in _requests().items():
-            with socket.create_connection((server.host, PORTS[port]), 5.0) as sock:
+            with socket.create_connection((server.host, PORTS[port]), 60.0) as sock:
                 sock.setblocking(False)
                 while data:
                     try:
@@ -251,7 +251,7 @@ def test_no_client_ends_the_server() -> None:
                 turn(10)
             turn(2)
             assert server.controller.cycle > 0, name
-        crowd = [socket.create_connection((server.host, PORTS["dashboard"]), 5.0) for _ in range(5)]
+        crowd = [socket.create_connection((server.host, PORTS["dashboard"]), 60.0) for _ in range(5)]
         turn(20)
         assert 0 < len(server._clients["dashboard"]) <= _MAX_CLIENTS
         for sock in crowd:
@@ -262,7 +262,7 @@ def test_more_clients_than_the_operating_system_can_watch_are_turned_away() -> N
     with Server(Controller(Options()), free_host()) as server:
         crowd = []
         for _ in range(_MAX_CLIENTS + 10):
-            crowd.append(socket.create_connection((server.host, PORTS["dashboard"]), 5.0))
+            crowd.append(socket.create_connection((server.host, PORTS["dashboard"]), 60.0))
             server._poll(0.0)
         assert len(server._clients["dashboard"]) == _MAX_CLIENTS
         for sock in crowd:

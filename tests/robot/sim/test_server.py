@@ -128,7 +128,7 @@ def test_a_cut_network_drops_packets_both_ways_and_closes_nothing() -> None:
         assert read_all(rtde, server, 20) == []  # the others are still cut
         server.faults.answer("restore network")
         assert read_all(rtde, server, 20)
-        with socket.create_connection((server.host, PORTS["dashboard"]), 1.0) as new:
+        with socket.create_connection((server.host, PORTS["dashboard"]), 60.0) as new:
             turn(server, 20)
             assert new.recv(100).startswith(b"Connected")
         script.close()
@@ -243,7 +243,7 @@ def test_a_read_only_port_sends_what_the_other_does_and_takes_no_program() -> No
     log = io.StringIO()
     with Server(Controller(Options(), log), free_host()) as server, contextlib.ExitStack() as stack:
         ports = (30001, 30011, 30012, 30013)
-        socks = {port: stack.enter_context(socket.create_connection((server.host, port), 5.0)) for port in ports}
+        socks = {port: stack.enter_context(socket.create_connection((server.host, port), 60.0)) for port in ports}
         turn(server, 10)
         for port, text in ((30011, b"stop program\n"), (30012, b"set_digital_out(0, True)\n"), (30013, b"halt\n")):
             socks[port].sendall(text)
@@ -260,7 +260,7 @@ def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
     with Server(Controller(Options()), free_host()) as server, contextlib.ExitStack() as stack:
         for name, port in PORTS.items():
             for _ in range(10):
-                stack.enter_context(socket.create_connection((server.host, port), 1.0))
+                stack.enter_context(socket.create_connection((server.host, port), 60.0))
                 server._poll(1.0)
             clients = server._clients[name]
             assert len(clients) == 10
@@ -283,10 +283,10 @@ def test_what_is_switched_off_or_not_there_takes_no_connection(options: dict[str
         server.restore("dashboard")
         for name, port in PORTS.items():
             if name not in missing:
-                socket.create_connection((server.host, port), 1.0).close()
+                socket.create_connection((server.host, port), 60.0).close()
                 continue
             with pytest.raises(ConnectionRefusedError):
-                socket.create_connection((server.host, port), 1.0)
+                socket.create_connection((server.host, port), 60.0)
 
 
 def test_a_controller_that_was_frozen_has_lost_cycles_and_no_time(monkeypatch: pytest.MonkeyPatch) -> None:

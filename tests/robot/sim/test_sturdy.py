@@ -41,7 +41,7 @@ class Reader:
     """Client of RTDE that counts the packets of data that it is sent."""
 
     def __init__(self, server: Server, names: tuple[str, ...] = NAMES) -> None:
-        self.socket = socket.create_connection((server.host, PORTS["RTDE"]), 5.0)
+        self.socket = socket.create_connection((server.host, PORTS["RTDE"]), 60.0)
         self.socket.sendall(pack_outputs_request(names) + pack(PacketKind.START))
         self.socket.setblocking(False)
         self.count, self._rest = 0, b""
@@ -81,7 +81,7 @@ def turn(server: Server, cycles: int = 1) -> None:
 
 
 def connect(server: Server, name: str) -> socket.socket:
-    made = socket.create_connection((server.host, PORTS[name]), 5.0)
+    made = socket.create_connection((server.host, PORTS[name]), 60.0)
     made.setblocking(False)
     return made
 

@@ -327,7 +327,7 @@ def test_the_wheel_notices_a_frozen_controller_and_comes_back(fresh: SimulatedCo
         wheel.wait_for(process, "NOTICED")  # by its own time-out: a frozen process closes nothing
         fresh.thaw()
         assert fresh.state()["q"] == pytest.approx(list(HOME))  # it answers, so it runs again
-        said, _ = process.communicate("go on\n", timeout=20)
+        said, _ = process.communicate("go on\n", timeout=60)
     finally:
         process.kill()
         process.communicate()
@@ -342,7 +342,7 @@ def test_the_wheel_notices_closed_connections(fresh: SimulatedController) -> Non
     try:
         wheel.wait_for(process, "CONNECTED")
         assert fresh.call("close rtde") == 1
-        said, _ = process.communicate(timeout=20)
+        said, _ = process.communicate(timeout=60)
     finally:
         process.kill()
         process.communicate()

@@ -35,7 +35,7 @@ def test_a_controller_is_examined_and_what_others_hold_is_named() -> None:
         assert {one.item: one for one in found}["arm, braking"].value.startswith(
             "stretched out with 0 kg, its motors brake"
         )
-        with socket.create_connection((simulated.host, 30002), timeout=5) as scripts:
+        with socket.create_connection((simulated.host, 30002), timeout=60) as scripts:
             scripts.sendall(b"sec carries():\n  set_payload(5)\nend\n")
         while "with 5 kg" not in (braking := _braking(arm_model("UR5e"), simulated.host, 10.0)[0]).value:
             pass

@@ -252,7 +252,7 @@ class Peer:
                 client.recv(4096)
 
     def __exit__(self, *_):
-        self._thread.join(10)
+        self._thread.join(60)
         self._server.close()
 
 
@@ -275,7 +275,7 @@ TYPES = rtde_codec.pack(ord("O"), b"\x01DOUBLE,VECTOR6D,VECTOR6D,INT32,UINT32,UI
 )  # fmt: skip
 def test_a_peer_that_is_no_controller_is_one_clear_line(answers, close, error, words):
     with Peer(*answers, close=close) as peer:
-        reader = StateReader(peer.host, timeout=0.3)
+        reader = StateReader(peer.host, timeout=60.0 if answers else 0.3)
         with pytest.raises(error, match=words), reader:
             pass
         assert reader.fileno() == -1
@@ -287,7 +287,7 @@ def test_the_end_of_the_connection_is_an_error_and_not_silence():
         StateReader(peer.host, timeout=1.0) as reader,
         pytest.raises(RobotConnectionError, match="has closed the connection"),
     ):
-        reader.wait(5.0)
+        reader.wait(60.0)
 
 
 def test_no_controller_there():
