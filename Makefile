@@ -1,6 +1,6 @@
 # make demo    set everything up and run the whole chain in simulation
 # make test    the short run of the tests
-# make check   what CI runs: format, lint, types, all tests
+# make check   what CI runs: format, lint, types, all tests, the properties with examples by SEED, or by the commit
 # make docs    the site, in build/site
 # make fuzz    the property tests with new random examples; SEED=123 repeats a run, MINUTES=5 goes on with new seeds
 # make dist    wheel and source distribution, in dist/; where there is a C compiler, a compiled wheel too

@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coneskin.cli import main
@@ -49,15 +49,15 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> list[list[Block]]:
 
 
 @pytest.mark.long
+@settings(max_examples=40)  # of 0.2 s each
 @given(seed=st.integers(0, 2**32))
 def test_no_mutated_recording_gives_a_traceback(bases: list[list[Block]], tmp_path_factory, seed: int) -> None:
     _replay_mutated(bases, tmp_path_factory.getbasetemp() / "mutated.rec", seed)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [*range(6), 1_653_136_768, 654_448])  # a picture that overflows, one without a key
-def test_a_few_mutated_recordings_give_no_traceback(bases: list[list[Block]], tmp_path: Path, seed: int) -> None:
-    """The short run's share of the test above."""
+@pytest.mark.parametrize("seed", [1_653_136_768, 654_448])  # a picture that overflows, one without a key
+def test_a_mutated_recording_that_gave_a_traceback_is_read(bases: list[list[Block]], tmp_path: Path, seed: int) -> None:
     _replay_mutated(bases, tmp_path / "mutated.rec", seed)
 
 
