@@ -50,10 +50,14 @@ def test_a_line_that_it_does_not_understand_changes_nothing(programs, sensor, li
     assert [frame for frame in frames if frame.status & Status.RESTARTED] == frames[:1]
 
 
-def test_a_rate_that_leaves_no_time_for_a_frame_is_an_overrun(programs, sensor):
-    frames = frames_of(run_board(programs, sensor, 0.5, commands=["0.02 port rate_hz=1000"]))
+def test_a_rate_that_leaves_no_time_for_a_frame_is_an_overrun_and_can_be_taken_back(programs, sensor):
+    commands = ["0.02 port rate_hz=1000", "0.3 port rate_hz=100"]
+    frames = frames_of(run_board(programs, sensor, 0.5, commands=commands))
+    *_, back = (number for number, frame in enumerate(frames) if frame.status & Status.RESTARTED)
     assert not any(frame.status & Status.OVERRUN for frame in frames[:5])
-    assert any(frame.status & Status.OVERRUN for frame in frames[-10:])
+    assert any(frame.status & Status.OVERRUN for frame in frames[back - 10 : back])
+    assert not any(frame.status & Status.OVERRUN for frame in frames[back:])
+    assert frames[-1].clock_us - frames[-2].clock_us == pytest.approx(10_000, abs=100)
 
 
 def test_the_self_test_finds_electrode_d_at_ground_which_no_untouched_phase_shows(programs, sensor):

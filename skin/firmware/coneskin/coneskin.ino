@@ -288,7 +288,8 @@ void setup() {
 }
 
 void loop() {
-  while ((int32_t)(micros() - next_us) < 0) read_commands();
+  do read_commands();  // once at least, or a rate that is too high would leave it deaf
+  while ((int32_t)(micros() - next_us) < 0);
   const uint32_t period = 1000000UL / settings[RATE_HZ];
   const bool late = micros() - next_us > period;  // the settings ask for more than a frame's time allows
   next_us = late ? micros() + period : next_us + period;
