@@ -179,7 +179,7 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
     assert said.pop("RTDE") == b"\0\4V\1"
     assert said.pop("dashboard") == b"Conn"
     states = ("primary", "secondary", "realtime")
-    assert set(said) == {*states, *(f"{name}, read-only" for name in states), "interpreter"}
+    assert set(said) == {*states, *(f"{name} (read-only)" for name in states), "interpreter"}
     assert all(len(data) == 4 for data in said.values())
 
 

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from coneskin.cli import main
+from coneskin.commissioning.examination.examination import Doctor
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.ur import measured
 from coneskin.robot.ur.measured import read_measured
 from tests.support.paths import ROOT
+from tests.support.scenes import forearm_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated controller needs several addresses")
 SCRIPT = ROOT / "scripts" / "measure_controller.py"
@@ -154,12 +157,25 @@ def test_limits_follow_what_was_measured(tmp_path):
     assert [f.verdict for f in found] == ["ok", "bad", "warning"]
     assert found[1].remedy.startswith("escalate_ms = 360 in [monitoring]")
     assert compare(read(tmp_path, facts(start_s=slow)), MonitoringLimits(escalate=0.36))[1].verdict == "ok"
+    endless = {"n": 1, "p50": 0.42, "p95": 0.42, "worst": 0.42}
+    found = compare(read(tmp_path, facts(start_s=endless)), MonitoringLimits())
+    assert found[1].remedy.startswith("escalate_ms can be 500 at most: ")
     late = read(tmp_path, facts(watchdog_s={"n": 1, "p50": 0.05, "p95": 0.05, "worst": 0.05}))
     assert compare(late, MonitoringLimits())[2].remedy.startswith("watchdog_hz = 5 in [arm]")
     assert compare(late, MonitoringLimits(), 5.0)[2].verdict == "ok"
     late = facts()
     late["stops"][0]["stands_s"] = slow | {"worst": 0.5}
     assert [f.item for f in compare(read(tmp_path, late), MonitoringLimits())][-1] == "measured, stop"
+
+
+def test_the_next_look_at_a_scene_compares_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(Doctor, "examine", lambda doctor: None)
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(forearm_scene())
+    read(tmp_path, facts(start_s={"n": 1, "p50": 0.3, "p95": 0.3, "worst": 0.3}))
+    assert main(["doctor", "scene.toml", "--measured", "m.json"]) == 1
+    said = capsys.readouterr().out
+    assert said.splitlines()[-1] == "next: mend what is bad, then coneskin doctor scene.toml --measured m.json"
 
 
 @pytest.mark.parametrize("made", [{}, [], facts(start_s={}), facts(stops=[{}])])

@@ -19,6 +19,7 @@ from coneskin.core.finding import Finding, Verdict
 from coneskin.core.text import read_json
 
 _MAX_SIZE = 1 << 20  # bytes
+_MOST_MS = 500  # of escalate_ms in a scene
 _LIMIT_MARGIN = 1.2  # times what was measured, for a limit that shall hold
 MEASURED_DECELERATION = 10.0  #: rad/s2 of the stops by program that the script measures
 _WATCHDOG_LATENESS = 0.02  # s, that the simulated controller's never reaches
@@ -89,6 +90,8 @@ def compare(
     value = f"a program starts after {1e3 * start:.0f} ms (p95), a stop shows after {1e3 * slows:.0f} ms (worst)"
     needed = math.ceil(1e3 * _LIMIT_MARGIN * max(start, slows))
     remedy = f"escalate_ms = {needed} in [monitoring]; else each stop goes on to the next path"
+    if needed > _MOST_MS:
+        remedy = f"escalate_ms can be {_MOST_MS:g} at most: ask what holds controller or network up, and measure again"
     judge("start of a program", max(start, slows) <= escalate, value, f"{1e3 * escalate:g} ms", remedy, "bad")
     value = f"it ends a program {1e3 * late:.0f} ms after its period (worst)"
     rule = f"{1e3 * _WATCHDOG_LATENESS:g} ms, or {1e3 * _WATCHDOG_TIME:g} ms with the period"

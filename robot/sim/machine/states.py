@@ -68,7 +68,7 @@ def has_since(version: Version, polyscope_5: int | None, cb3: int | None) -> boo
 #: name of a service -> its TCP port on a UR controller; ur_rtde knows no others
 PORTS = {"RTDE": 30004, "dashboard": 29999, "primary": 30001, "secondary": 30002, "realtime": 30003}
 SCRIPT_PORTS = ("primary", "secondary", "realtime")  #: those that take URScript, and send the state
-READ_ONLY = ", read-only"  #: end of the name of a port beside each of these, which takes nothing
+READ_ONLY = " (read-only)"  #: end of the name of a port beside each of these, which takes nothing
 PORTS |= {"interpreter": 30020, **{name + READ_ONLY: PORTS[name] + 10 for name in SCRIPT_PORTS}}
 FIRST_X = 10  #: major version of PolyScope X
 #: arm that is simulated where none is named

@@ -144,7 +144,8 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
 def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:
     name = shlex.quote(str(args.scene)) + (" --simulated" if args.simulated else "")
     if code:
-        print_hint(f"next: mend what is bad, then coneskin doctor {name}")
+        measured = f" --measured {shlex.quote(str(args.measured))}" if args.measured else ""
+        print_hint(f"next: mend what is bad, then coneskin doctor {name}{measured}")
     elif scene.moves_away:
         print_hint(f"next: coneskin commission {name}")
     else:

@@ -273,7 +273,7 @@ def test_ten_clients_of_each_service_are_greeted_and_looked_after() -> None:
 @pytest.mark.parametrize(
     ("options", "missing"),
     [
-        ({"closed": frozenset({"primary", "RTDE"})}, {"primary", "primary, read-only", "RTDE"}),
+        ({"closed": frozenset({"primary", "RTDE"})}, {"primary", "primary (read-only)", "RTDE"}),
         ({"version": (10, 11)}, {"dashboard"}),
     ],
 )
