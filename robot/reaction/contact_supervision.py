@@ -33,7 +33,8 @@ _FALL_TIME = 0.05  # s in which the level has to fall by _MIN_FALL, again and ag
 _MIN_FALL = 0.01  # of the level; six times its noise, and above 20 N what half the force is
 _MAX_RISE = 0.01  # of the level, above the least since the surface moved away
 _MAX_JUMP = 0.02  # m along the skin; a fingertip rolls by less
-_MAX_DOUBT = 0.004  # s for which a firm touch may be without a certain place, and a frame; one that ends is for a few
+_MAX_DOUBT = 0.004  # s for which a firm touch may be without a certain place; one that ends is for a few frames
+_FRAME_WAIT = 0.05  # s for which a doubt waits for another frame to tell the same; none is older in a motion away
 _SAME_SIDE = 0.5  # cosine; normals farther apart than 60 deg may hold the arm between them
 
 
@@ -102,7 +103,7 @@ class ContactSupervision:
             if watched.doubted is None:
                 watched.doubted = time, contact
             since, first = watched.doubted
-            if time - since >= _MAX_DOUBT and contact != first and not self._complying:  # by another frame, too
+            if time - since >= (_FRAME_WAIT if contact == first else _MAX_DOUBT) and not self._complying:
                 return "the place of the touch is not certain any more"
         return ""
 

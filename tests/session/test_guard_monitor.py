@@ -39,7 +39,7 @@ def watchdog():
 
 
 def until(what):
-    end = time.monotonic() + 5.0
+    end = time.monotonic() + 60.0
     while not what():
         assert time.monotonic() < end
         time.sleep(0.001)

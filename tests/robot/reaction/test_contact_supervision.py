@@ -25,6 +25,7 @@ def test_a_doubt_of_several_frames_ends_it():
 def test_a_doubt_of_one_frame_does_not_however_late_a_busy_computer_reads_the_next():
     assert reasons((1.0, LOST), (1.03, LOST), (1.031, TOUCH), (1.032, FADING)) == ["", "", "", ""]
     assert reasons((1.0, LOST), (1.03, LOST), (1.031, FADING)) == ["", "", NOT_CERTAIN]
+    assert reasons((1.0, LOST), (1.049, LOST), (1.051, LOST)) == ["", "", NOT_CERTAIN]  # or of a skin without noise
 
 
 def test_a_light_touch_needs_no_place():
