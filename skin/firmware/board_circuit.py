@@ -10,17 +10,15 @@ from __future__ import annotations
 import csv
 import io
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import cache
 from typing import Any, NamedTuple
 
 from coneskin.core.errors import SensorError
 from coneskin.skin.electronics import SENSE_GAIN, LeadOhms, shunt_ohms
 from coneskin.skin.sensor import Sensor
 
-from .boards import BOARD_FACTS, BUILT_IN, Board, BoardFacts, Converter, boards, converters, firmware_folder
+from .boards import BUILT_IN, Board, BoardFacts, Converter, boards, converters, part_catalog
 
 _WIRE_OHMS = 1.0  # of the wire of an electrode, with bead, plug and foil
 _QUIET_BITS = 12  # with fewer, a converter without noise of its own reads the same count for ever
@@ -208,7 +206,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     table = boards()
     if name not in table:
         raise SensorError(f"board must be one of {', '.join(table)}, got {name!r}")
-    board, facts = table[name], BOARD_FACTS[name]
+    board, facts = table[name], BoardFacts(**part_catalog()[name]["facts"])
     switch, limits = switch_for(sensor)
     if switch == "low_switch" and facts.logic_volts > 3.3:
         raise SensorError(
@@ -220,7 +218,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
         decade = math.floor(math.log10(supply))
         supply = round(10.0 ** (round(96.0 * math.log10(supply)) / 96.0 - decade), 2) * 10.0**decade
     bits, volts, other = board.bits + _EXTRA_BITS, sensor.electronics.adc_volts, None
-    if converter == BUILT_IN and not facts.own_converter:
+    if converter == BUILT_IN and not board.sense:
         raise SensorError(
             f"the converter of an {facts.title} is dead below 0.14 V and bent by per cents, and places touches "
             "centimetres off: give it a converter, as with --converter ads1115"
@@ -264,19 +262,6 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
             f"{1e3 * largest:.3g} mA: give the sheets a higher resistance, or a lower supply_v"
         )
     return BoardCircuit(board, facts, fitted, shunt, resistor, other)
-
-
-@cache
-def part_catalog() -> dict[str, Any]:
-    """Return the tables of parts.toml by name; pins as the numbers of their pads."""
-    catalog = tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
-    for row in catalog.values():
-        pads: dict[str, list[str]] = {}
-        for number, names in enumerate(row.get("pins", "").split(), 1):
-            for name in names.split("="):
-                pads.setdefault(name, []).append(str(number))
-        row["pins"] = pads
-    return catalog
 
 
 def _order_numbers(row: Mapping[str, Any], value: str) -> tuple[str, str]:

@@ -3,94 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import indent
 from xml.sax.saxutils import escape
 
-from .board_circuit import WIRES, BoardCircuit, Component, part_catalog
+from .board_circuit import WIRES, BoardCircuit, Component
+from .boards import firmware_folder, part_catalog
 
 
 def board_page(circuit: BoardCircuit) -> str:
     """Return the page that stands beside the sketch."""
-    board, facts, sensor = circuit.board, circuit.facts, circuit.sensor
+    facts, sensor = circuit.facts, circuit.sensor
     parts = sensor.electronics
-    count, volt = parts.full_count, parts.full_count / parts.adc_volts
-    zero, bias = parts.count_amperes(0.0), 50.0 * parts.current_zero * circuit.shunt_ohms
+    count, bias = parts.full_count, 50.0 * parts.current_zero * circuit.shunt_ohms
     clip = (3.3 - 1e-3 * part_catalog()["amplifier"]["limits"]["swing_mv"][1] - bias) / (50.0 * circuit.shunt_ohms)
-    share = clip / max(sensor.radial_amperes, sensor.angular_amperes)
     rate, remark = facts.rate, f"{facts.remark[:1].upper()}{facts.remark[1:]}. "
     if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
         chips = f"{'an' if other.pull_down else 'two'} {other.name.upper()} in place of its converter"
         rate, remark = f"{other.rate_hz}, measured in emulation on an Uno, with {chips}", ""
-    lines = [
-        f"# {facts.title} for {sensor.name}",
-        "",
-        f"Drawing: wiring.svg. Parts, prices, second sources: parts.csv. For a layout in KiCad: board.net. "
-        f"{remark}Frames per second: {rate}. This is no safety-rated device.",
-        "",
-        f"Drive currents: {1e3 * sensor.radial_amperes:.3g} mA from {_ends(sensor.b_positive, 'B', 'A')}, "
-        f"{1e3 * sensor.angular_amperes:.3g} mA from {_ends(sensor.c_positive, 'C', 'D')}; full scale "
-        f"{1e3 * parts.current_full_scale:.3g} mA. The amplifier, on 3V3, ends at {1e3 * clip:.3g} mA, {share:.2f} "
-        "times the larger one; a short is told from twice.",
-        "",
-        "Build it on a printed board from board.net (two layers, ground all over the lower one), or on strip board "
-        "with the adapters and sockets of parts.csv; 0805 fits between holes of 2.54 mm. Not on a plug-in breadboard: "
-        "its contacts add ohms that come and go. Clamps within 10 mm of J1, so that each foil wire meets the clamp "
-        "first, then the bead or resistor. The amplifier's IN+ and IN- go to the pads of R1 on wires of their own. "
-        "Each 100 nF at its chip, each 470 pF at its converter's pin.",
-        "",
-        "| pin | net of the drawing |",
-        "|---|---|",
-        *(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
-        "",
-        "Cable, up to 3 m, at J1; the braid is joined to ground here and nowhere else. At the sensor's plug, both "
-        "wires of an electrode go to its pin: E_A and S_A to 1, those of B to 2, of C to 3, of D to 4. The sensor's "
-        "own four wires have other colours.",
-        "",
-        "| pole | net | wire |",
-        "|---|---|---|",
-        *(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
-        "",
-        "First steps. Each number must be there before the next:",
-        "",
-        "| step | what should read |",
-        "|---|---|",
-        "| no sensor, no board in its socket: 5V, 3V3 to GND | more than 1 kohm, either way |",
-        "| the board by itself, over USB | flashed as below, and only then put into its socket |",
-        f"| powered, no sensor: RAIL | {parts.supply_volts:g} V, 3 % |",
-        f"| BIAS, AMP | {bias * 1e3:.0f} mV both, within 5 mV |",
-        f"| no sensor: `coneskin monitor /dev/ttyACM0 --baud {board.baud} --json` | frames; the drive currents "
-        "within 2 counts of the zero |",
-        f"| the zero, `touch_current` | {zero} counts of {count}, {round(0.012 * count)} more or less |",
-        f"| `touch_supply` | {parts.supply_volts * volt:.0f} counts |",
-        f"| sensor plugged in: `radial_current` | {parts.count_amperes(sensor.radial_amperes)} counts |",
-        f"| `angular_current` | {parts.count_amperes(sensor.angular_amperes)} counts |",
-        f"| the six guides, untouched | under {max(2, count // 100)} counts |",
-        "",
-        "Flash (the first line with avr-gcc of Debian's packages, or with arduino-cli; the second by hand):",
-        "",
-        f"    coneskin firmware SENSOR --board {board.name} --to FOLDER --flash /dev/ttyACM0",
-        f"    arduino-cli compile --upload --fqbn {facts.target} --port /dev/ttyACM0 coneskin",
-        "",
-        "The scene:",
-        "",
-        *(f"    {line}" for line in circuit.scene_lines.splitlines()),
-        "",
-    ]
-    if settings := _settings(circuit):
-        lines += [
-            "Settings, each a line over the serial port, then `save`:",
-            "",
-            *(f"    {one}" for one in settings),
-            "",
-        ]
-    return "\n".join(lines)
+    return (
+        (firmware_folder() / "board_page.txt")
+        .read_text(encoding="utf-8")
+        .format(
+            **{
+                "board": circuit.board,
+                "facts": facts,
+                "sensor": sensor,
+                "parts": parts,
+                "rate": rate,
+                "remark": remark,
+            },
+            radial=1e3 * sensor.radial_amperes,
+            angular=1e3 * sensor.angular_amperes,
+            radial_ends=_ends(sensor.b_positive, "B", "A"),
+            angular_ends=_ends(sensor.c_positive, "C", "D"),
+            full_scale=1e3 * parts.current_full_scale,
+            clip=1e3 * clip,
+            share=clip / max(sensor.radial_amperes, sensor.angular_amperes),
+            pins="\n".join(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
+            poles="\n".join(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
+            bias=1e3 * bias,
+            zero=parts.count_amperes(0.0),
+            zero_most=round(0.012 * count),
+            supply=parts.count_volts(parts.supply_volts),
+            radial_counts=parts.count_amperes(sensor.radial_amperes),
+            angular_counts=parts.count_amperes(sensor.angular_amperes),
+            guide_most=max(2, count // 100),
+            scene=indent(circuit.scene_lines, "    "),
+            settings=_settings(circuit),
+        )
+    )
 
 
 def _ends(normal: bool, first: str, second: str) -> str:
     return f"{first} to {second}" if normal else f"{second} to {first}"
 
 
-def _settings(circuit: BoardCircuit) -> list[str]:
-    """Return the settings that are not the sketch's own."""
+def _settings(circuit: BoardCircuit) -> str:
+    """Return what is to be said of settings that are not the sketch's own."""
     sensor = circuit.sensor
     usual_share = 758 if circuit.converter is None else circuit.converter.permille
     wanted = {
@@ -100,7 +69,8 @@ def _settings(circuit: BoardCircuit) -> list[str]:
         "a_positive": (int(not sensor.b_positive), 0),
         "d_positive": (int(not sensor.c_positive), 0),
     }
-    return [f"{name}={value}" for name, (value, usual) in wanted.items() if value != usual]
+    changed = [f"    {name}={value}\n" for name, (value, usual) in wanted.items() if value != usual]
+    return "".join(["\nSettings, each a line over the serial port, then `save`:\n\n", *changed]) if changed else ""
 
 
 _WIDTH, _FIRST_ROW, _ROW_HEIGHT, _GROUP_GAP = 1520, 100, 15, 26  # of the drawing; of a row, between two groups

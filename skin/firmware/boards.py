@@ -6,12 +6,14 @@ The firmware of the Uno and of the Pico was run as compiled, in emulators. What 
 from __future__ import annotations
 
 import re
+import tomllib
+from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 
 class BoardFacts(NamedTuple):
-    """What is to be known about a board."""
+    """What is to be known about a board, as parts.toml has it."""
 
     title: str
     target: str  #: name of the board for ``arduino-cli``
@@ -20,29 +22,6 @@ class BoardFacts(NamedTuple):
     clock_ppm: int  #: how far its clock may be off [ppm]
     rate: str  #: frames per second with the usual settings
     remark: str
-    own_converter: bool = True  #: good enough for a sensor
-
-
-#: Board, as the sketch's table names it -> its facts.
-BOARD_FACTS: dict[str, BoardFacts] = {
-    "uno": BoardFacts(
-        *("Arduino Uno R3 or Nano", "arduino:avr:uno", 5.0, "5V", 5000, "200, measured in emulation"),
-        "wire 3.3 V to AREF; its clock is a ceramic resonator",
-    ),
-    "nano-every": BoardFacts(
-        *("Arduino Nano Every", "arduino:megaavr:nona4809", 5.0, "5V", 30_000, "200, not tried"),
-        "wire 3.3 V to AREF; its clock is the controller's own oscillator",
-    ),
-    "pico": BoardFacts(
-        *("Raspberry Pi Pico", "rp2040:rp2040:rpipico", 3.3, "VBUS", 100, "200, at most 790, measured in emulation"),
-        "has three channels: an analog multiplexer brings the six to one of them",
-    ),
-    "teensy": BoardFacts(
-        *("Teensy 4.0", "teensy:avr:teensy40", 3.3, "VIN", 100, "200, at most 1000: not tried"),
-        "its pins do not stand more than 3.3 V",
-    ),
-    "esp32": BoardFacts("ESP32-DevKitC", "esp32:esp32:esp32", 3.3, "5V", 100, "40, not tried", "", False),
-}
 
 
 _BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
@@ -111,6 +90,19 @@ def converters() -> dict[str, Converter]:
         numbers = int(bits), 1e-3 * int(millivolts), int(extra), int(rate), int(permille)
         found[name] = Converter(name, *numbers, _pins(pull_down))
     return found
+
+
+@cache
+def part_catalog() -> dict[str, Any]:
+    """Return the tables of parts.toml by name; pins as the numbers of their pads."""
+    catalog = tomllib.loads((firmware_folder() / "parts.toml").read_text(encoding="utf-8"))
+    for row in catalog.values():
+        pads: dict[str, list[str]] = {}
+        for number, names in enumerate(row.get("pins", "").split(), 1):
+            for name in names.split("="):
+                pads.setdefault(name, []).append(str(number))
+        row["pins"] = pads
+    return catalog
 
 
 def board_header(converter: str = BUILT_IN) -> bytes:

@@ -15,13 +15,13 @@ from coneskin.cli import main
 from coneskin.geometry.frustum import Frustum
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.electronics import Electronics
-from coneskin.skin.firmware.board_circuit import board_circuit, part_catalog
-from coneskin.skin.firmware.boards import BOARD_FACTS, BUILT_IN, boards, converters, firmware_folder
+from coneskin.skin.firmware.board_circuit import board_circuit
+from coneskin.skin.firmware.boards import BUILT_IN, boards, converters, firmware_folder, part_catalog
 from coneskin.skin.sensor import Sensor
 from tests.support.firmware.spice_deck import SENSORS
 
 CONE = "radius1_mm = 37.5\nradius2_mm = 37.5\nheight_mm = 240\nwrap_deg = 350\n"
-OWN = [name for name, facts in BOARD_FACTS.items() if facts.own_converter]
+OWN = [name for name, row in boards().items() if row.sense]
 each_board = pytest.mark.parametrize("board", OWN)
 
 
@@ -39,10 +39,6 @@ def write(sensor_file, *options):
 
 def part_rows(folder):
     return list(csv.DictReader((folder / "parts.csv").read_text(encoding="utf-8").splitlines()))
-
-
-def test_the_table_of_pins_has_a_row_for_each_board_that_facts_are_known_of():
-    assert list(boards()) == list(BOARD_FACTS)
 
 
 @each_board
@@ -70,7 +66,7 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
     first = parts["R1"]
     assert first["value"] == "11.3 ohm"
     assert (first["number"], first["second source"]) == ("Yageo RC0805FR-0711R3L", "Vishay CRCW080511R3FKEA")
-    assert parts.pop("A1")["what"] == BOARD_FACTS[board].title
+    assert parts.pop("A1")["what"] == part_catalog()[board]["facts"]["title"]
     assert parts.pop("for")["number"] == "any"  # the last of the adapters
     for row in parts.values():
         assert float(row["EUR"]) == pytest.approx(int(row["count"]) * float(row["EUR each"]))
@@ -84,7 +80,7 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
 def test_every_limit_says_where_it_stands():
     catalog = part_catalog()
     assert {name for name, row in catalog.items() if {*row["limits"]} != {*row.get("sources", {})}} == set()
-    assert {*BOARD_FACTS} <= {*catalog}
+    assert {*boards()} <= {*catalog}
 
 
 @each_board
@@ -262,8 +258,8 @@ def test_pins_have_the_numbers_of_their_footprints(board, converter):  # and U1 
 
 BUILDS = [
     *((name, BUILT_IN) for name in OWN),
-    *((name, converter) for name in BOARD_FACTS for converter in ("ads1115", "ads1015")),
-    *((name, "ltc1867") for name, facts in BOARD_FACTS.items() if facts.logic_volts == 5.0),
+    *((name, converter) for name in boards() for converter in ("ads1115", "ads1015")),
+    *((name, "ltc1867") for name in ("uno", "nano-every")),
 ]
 
 

@@ -22,7 +22,8 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault
 from coneskin.skin.electronics import SENSE_GAIN
-from coneskin.skin.firmware.board_circuit import BoardCircuit, board_circuit, part_catalog, switch_for
+from coneskin.skin.firmware.board_circuit import BoardCircuit, board_circuit, switch_for
+from coneskin.skin.firmware.boards import part_catalog
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, frame_of
 from coneskin.skin.virtual.field_contacts import FieldContacts

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.firmware.board_circuit import PIN_OHMS, BoardCircuit, part_catalog
+from coneskin.skin.firmware.board_circuit import PIN_OHMS, BoardCircuit
+from coneskin.skin.firmware.boards import part_catalog
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, Matrix, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
