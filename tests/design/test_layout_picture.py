@@ -1,5 +1,6 @@
 """The layout of a sheet: every length with its unit, every kind of line explained."""
 
+import itertools
 import math
 import re
 
@@ -54,3 +55,16 @@ def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str,
     assert crossing == (wrap_deg > 200.0)
     rim = [y for line in axes.lines[:1] for y in line.get_ydata()]
     assert cy < min(rim) if wires == "end1" else cy > min(rim)
+
+
+def test_a_cable_that_passes_edge_0_is_drawn_as_one_line() -> None:
+    """From edge 330 deg it goes on past 360: on the link a step of 4 mm, not once around it."""
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    figure = module.Figure()
+    frustum = Frustum(0.05, 0.06, 0.1, math.radians(330.0))
+    (design,) = design_sheets((PlacedFrustum(frustum),), DesignOptions(wires="edge1"))
+    draw_layout(figure, design, _sheet_wires(design.layout, design.way))
+    (led,) = [line for line in figure.axes[0].lines if line.get_linewidth() == 2.5]
+    places = list(zip(led.get_xdata(), led.get_ydata(), strict=True))
+    assert design.way.surface[-1, 1] > math.tau
+    assert max(math.dist(one, two) for one, two in itertools.pairwise(places)) < 7.0

@@ -452,7 +452,7 @@ class LinkSurface:
             if not may.any():
                 continue
             tie = int(np.flatnonzero(may)[np.abs(gone[may] - 0.5 * gone[-1]).argmin()])
-            at = np.stack([u[np.array(cells) // len(phi)], phi[np.array(cells) % len(phi)]], axis=1)
+            at = np.stack([u[np.array(cells) // len(phi)], np.unwrap(phi[np.array(cells) % len(phi)])], axis=1)
             first = at[0]
             out_u, out_phi = (apron.u, float(first[1])) if side.startswith("end") else (float(first[0]), apron.phi)
             return CableWay(side, out_u, out_phi % math.tau, at, points[cells], normals[cells], gone, tie, hangs)
