@@ -86,6 +86,7 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[S
     turned = math.tau * round((float(way.surface[0, 1]) - 0.5 * cone.wrap) / math.tau)
 
     exit_phi = float(way.surface[0, 1]) - turned
+    across = []
     for wire in wires:
         name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
         style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
@@ -96,12 +97,15 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[S
             axes.plot(
                 *zip(_at(cone, wire.u, wire.phi), _at(cone, *beyond), _at(cone, beyond[0], edge), strict=True), **style
             )
-            word = "across\nthe seam" if design.has_seam else "around\nthe link"
-            x, y = _at(cone, wire.u + 3.5 * off[0] * tab, wire.phi)
-            axes.text(x, y, f"{name}, {word}", fontsize=7, ha="center", va="center")
+            across.append(wire)
             continue
         run = [_at(cone, *(beyond[i] + (target[i] - beyond[i]) * k / 24.0 for i in range(2))) for k in range(25)]
         axes.plot(*zip(_at(cone, wire.u, wire.phi), *run, strict=True), **style)
+    if across:  # beside each other there is no room for a word each
+        names = ", ".join(wire.electrode for wire in across)
+        word = "across\nthe seam" if design.has_seam else "around\nthe link"
+        x, y = _at(cone, across[0].u + 3.5 * off[0] * tab, sum(wire.phi for wire in across) / len(across))
+        axes.text(x, y, f"{names}, {word}", fontsize=7, ha="center", va="center")
     led = [_at(cone, float(u), float(phi) - turned) for u, phi in way.surface]
     axes.plot(*zip(*led, strict=True), color=INK_COLOUR, lw=2.5)
     for index, marker, word, length in (
