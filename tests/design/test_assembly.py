@@ -83,6 +83,16 @@ def test_sheets_that_meet_are_drawn_back_to_the_gap(second: PlacedFrustum) -> No
     assert lost[0] == pytest.approx(lost[1], abs=1e-9)
 
 
+def test_the_ends_of_sheets_about_axes_across_each_other_are_no_joint() -> None:
+    """A corner of one comes within 15 mm of the other's: nothing is to be joined there, and no label says so."""
+    tube = Frustum(0.04, 0.04, 0.1)
+    across = PlacedFrustum(tube, Pose.from_xyz_rpy((0.0, 0.06, 0.145), (-0.5 * math.pi, 0.0, 0.0)))
+    for second, joined in ((across, 0), (at(0.11, tube), 1)):
+        for one in design_sheets([at(0.0, tube), second], DesignOptions()):
+            assert len(one.joints) == joined
+            assert min(one.gaps.values()) < 0.02
+
+
 def test_sheets_apart_stay_as_they_are() -> None:
     places = [at(0.0, Frustum(0.05, 0.05, 0.1)), at(0.2, Frustum(0.03, 0.03, 0.1))]
     assert clear_of_each_other(places, THICKNESS, 1e-3) == places

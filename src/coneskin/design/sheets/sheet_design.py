@@ -48,6 +48,7 @@ JigSurface = Literal["link", "cone", "none"]
 _MIN_GRIP = 4e-3  # m
 _CONNECTOR_LIMITS = (0.03, 2.0)  # m; from the rim to the connector
 _NEAR_SHEET = 0.02  # m; a sheet so near is a neighbor
+_JOINED_COSINE = 0.95  # of the axes of sheets whose ends run along each other
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,13 +309,15 @@ def design_assembly(
 
 
 def _joints(placed: Sequence[PlacedSheet], first: int) -> dict[int, dict[str, dict[int, str]]]:
-    """Return, by sheet and end, what meets it, with the number of the joint."""
+    """Return, by sheet and end, what meets it, with the number of the joint; no sheet about an axis across its own."""
     found: dict[int, dict[str, dict[int, str]]] = {number: {} for number in range(first, first + len(placed))}
     count = 0
     for (i, one), (j, two) in combinations(enumerate(placed, first), 2):
         gaps = sheet_gap(one.sheet, two.sheet), sheet_gap(two.sheet, one.sheet)
         shares = [u / sheet.place.frustum.slant for (_, u), sheet in zip(gaps, (one, two), strict=True)]
-        if gaps[0][0] < _NEAR_SHEET and all(abs(share - 0.5) > 0.45 for share in shares):
+        axes = (sheet.place.link_frustum.rotate((0.0, 0.0, 1.0)) for sheet in (one.sheet, two.sheet))
+        along = abs(float(np.dot(*axes))) > _JOINED_COSINE
+        if along and gaps[0][0] < _NEAR_SHEET and all(abs(share - 0.5) > 0.45 for share in shares):
             count += 1
             ends = [f"end {1 if share < 0.5 else 2}" for share in shares]
             found[i].setdefault(ends[0], {})[count] = f"{ends[1]} of sheet {j}"
