@@ -60,12 +60,6 @@ class BoardCircuit(NamedTuple):
     converter: Converter | None  #: in place of the board's own
 
     @property
-    def supply_permille(self) -> int:
-        """The rail, of the converter's range."""
-        parts = self.sensor.electronics
-        return round(1e3 * parts.supply_volts / parts.adc_volts)
-
-    @property
     def keys(self) -> dict[str, float | int | list[float]]:
         """What a sensor's table in a scene says of this board: it overrules the sensor's file."""
         parts = self.sensor.electronics
@@ -107,7 +101,10 @@ class BoardCircuit(NamedTuple):
         """Return the bill of materials as CSV, a line for all alike, with a price for all of them [EUR]."""
         catalog, lines = part_catalog(), io.StringIO()
         alike: dict[tuple[str, str], list[str]] = {}
-        others = Component("W1", "cable", "", "", {}), *(Component(f"X{k}", "socket", "", "", {}) for k in (1, 2))
+        others = [Component("W1", "cable", "", "", {}), *(Component(f"X{k}", "socket", "", "", {}) for k in (1, 2))]
+        for component in self.components:
+            if package := catalog[component.part].get("adapter"):
+                others.append(Component(f"X{component.name}", "adapter", package, "", {}))
         for component in [*self.components, *others]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
@@ -118,13 +115,6 @@ class BoardCircuit(NamedTuple):
             row, count = catalog[part], len(names)
             told = row["what"], value, *_order_numbers(row, value), row["price"], f"{count * row['price']:.1f}"
             rows.writerow((count, " ".join(names), *told, row["source"], _unsourced_limits(row)))
-        adapters: dict[str, list[str]] = {}
-        for component in self.components:
-            adapters.setdefault(catalog[component.part].get("adapter", ""), []).append(component.name)
-        for package, names in adapters.items():
-            if package:
-                what = f"without a printed board: adapter from {package}, to pins of 2.54 mm"
-                rows.writerow((len(names), f"for {' '.join(names)}", what, "", "any", "any", 1, len(names), "", ""))
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
@@ -155,33 +145,20 @@ class BoardCircuit(NamedTuple):
         elif board.common:
             found |= {board.common: "MUX", **{pin: f"MUX_{k}" for k, pin in enumerate(board.select)}}
         else:
-            found |= dict(zip(board.sense, ("ADC_A", "ADC_B", "ADC_C", "ADC_D"), strict=True))
-            found |= {board.current: "ADC_I", board.supply: "ADC_S"}
+            channels = (*board.sense, board.current, board.supply)
+            found |= {channel: f"ADC_{name}" for channel, name in zip(channels, "ABCDIS", strict=True)}
         for pins, net in ((board.rail, "HIGH_"), (board.ground, "LOW_")):
             found |= {pin: net + name for pin, name in zip(pins, "ABCD", strict=True)}
         return found | {pin: f"DOWN_{name}" for pin, name in zip(board.pull_down, "CD", strict=True)}
 
-    @property
-    def scene_lines(self) -> str:
-        """What the scene says about this board, TOML."""
-        lines = [
-            "[[link.sensor]]              # beside its file, or its radii",
-            *(f"{key} = {value_text(value)}" for key, value in self.keys.items()),
-            "[source]",
-            'kind = "serial"',
-            'port = "/dev/ttyACM0"        # yours',
-            f"baud = {self.board.baud}",
-        ]
-        if self.monitoring:
-            lines += ["[monitoring]", *(f"{key} = {value_text(value)}" for key, value in self.monitoring.items())]
-        return "\n".join(lines) + "\n"
+
+def toml_lines(values: Mapping[str, float | int | list[float]]) -> list[str]:
+    """Return keys and values as lines of TOML."""
+    return [f"{key} = {_value_text(value)}" for key, value in values.items()]
 
 
-def value_text(value: float | int | list[float]) -> str:
-    """Return a value as TOML has it."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(value_text, value))}]"
-    return f"{value:.10g}"
+def _value_text(value: float | int | list[float]) -> str:
+    return f"[{', '.join(map(_value_text, value))}]" if isinstance(value, list) else f"{value:.10g}"
 
 
 def _ohms_text(ohms: float) -> str:

@@ -6,51 +6,45 @@ from collections.abc import Mapping
 from textwrap import indent
 from xml.sax.saxutils import escape
 
-from .board_circuit import WIRES, BoardCircuit, Component
+from .board_circuit import WIRES, BoardCircuit, Component, toml_lines
 from .boards import firmware_folder, part_catalog
 
 
 def board_page(circuit: BoardCircuit) -> str:
     """Return the page that stands beside the sketch."""
-    facts, sensor = circuit.facts, circuit.sensor
-    parts = sensor.electronics
+    sensor, parts = circuit.sensor, circuit.sensor.electronics
     count, bias = parts.full_count, 50.0 * parts.current_zero * circuit.shunt_ohms
     clip = (3.3 - 1e-3 * part_catalog()["amplifier"]["limits"]["swing_mv"][1] - bias) / (50.0 * circuit.shunt_ohms)
-    rate, remark = facts.rate, f"{facts.remark[:1].upper()}{facts.remark[1:]}. "
+    rate, remark = circuit.facts.rate, f"{circuit.facts.remark} "
     if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
         chips = f"{'an' if other.pull_down else 'two'} {other.name.upper()} in place of its converter"
         rate, remark = f"{other.rate_hz}, measured in emulation on an Uno, with {chips}", ""
-    return (
-        (firmware_folder() / "board_page.txt")
-        .read_text(encoding="utf-8")
-        .format(
-            **{
-                "board": circuit.board,
-                "facts": facts,
-                "sensor": sensor,
-                "parts": parts,
-                "rate": rate,
-                "remark": remark,
-            },
-            radial=1e3 * sensor.radial_amperes,
-            angular=1e3 * sensor.angular_amperes,
-            radial_ends=_ends(sensor.b_positive, "B", "A"),
-            angular_ends=_ends(sensor.c_positive, "C", "D"),
-            full_scale=1e3 * parts.current_full_scale,
-            clip=1e3 * clip,
-            share=clip / max(sensor.radial_amperes, sensor.angular_amperes),
-            pins="\n".join(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
-            poles="\n".join(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
-            bias=1e3 * bias,
-            zero=parts.count_amperes(0.0),
-            zero_most=round(0.012 * count),
-            supply=parts.count_volts(parts.supply_volts),
-            radial_counts=parts.count_amperes(sensor.radial_amperes),
-            angular_counts=parts.count_amperes(sensor.angular_amperes),
-            guide_most=max(2, count // 100),
-            scene=indent(circuit.scene_lines, "    "),
-            settings=_settings(circuit),
-        )
+    limits = ["[monitoring]", *toml_lines(circuit.monitoring)] if circuit.monitoring else []
+    template = (firmware_folder() / "board_page.txt").read_text(encoding="utf-8")
+    return template.format(
+        circuit=circuit,
+        parts=parts,
+        rate=rate,
+        remark=remark,
+        radial=1e3 * sensor.radial_amperes,
+        angular=1e3 * sensor.angular_amperes,
+        radial_ends=_ends(sensor.b_positive, "B", "A"),
+        angular_ends=_ends(sensor.c_positive, "C", "D"),
+        full_scale=1e3 * parts.current_full_scale,
+        clip=1e3 * clip,
+        share=clip / max(sensor.radial_amperes, sensor.angular_amperes),
+        pins="\n".join(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
+        poles="\n".join(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
+        bias=1e3 * bias,
+        zero=parts.count_amperes(0.0),
+        zero_most=round(0.012 * count),
+        supply=parts.count_volts(parts.supply_volts),
+        radial_counts=parts.count_amperes(sensor.radial_amperes),
+        angular_counts=parts.count_amperes(sensor.angular_amperes),
+        guide_most=max(2, count // 100),
+        keys=indent("\n".join(toml_lines(circuit.keys)), "    "),
+        limits="".join(f"    {line}\n" for line in limits),
+        settings=_settings(circuit),
     )
 
 
@@ -60,12 +54,12 @@ def _ends(normal: bool, first: str, second: str) -> str:
 
 def _settings(circuit: BoardCircuit) -> str:
     """Return what is to be said of settings that are not the sketch's own."""
-    sensor = circuit.sensor
+    sensor, parts = circuit.sensor, circuit.sensor.electronics
     usual_share = 758 if circuit.converter is None else circuit.converter.permille
     wanted = {
         "device": (sensor.device_id, 0),
         "sensor": (sensor.sensor_id, 0),
-        "supply_permille": (circuit.supply_permille, usual_share),
+        "supply_permille": (round(1e3 * parts.supply_volts / parts.adc_volts), usual_share),
         "a_positive": (int(not sensor.b_positive), 0),
         "d_positive": (int(not sensor.c_positive), 0),
     }

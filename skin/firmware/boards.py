@@ -5,8 +5,10 @@ The firmware of the Uno and of the Pico was run as compiled, in emulators. What 
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,7 +30,7 @@ _BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
 _CONVERTER_PATTERN = re.compile(r'^const Converter CONVERTER = \{"([a-z]+\d+)", (.*)\};$', re.MULTILINE)
 _CONVERTER_CHOICE = "#define CONESKIN_CONVERTER "
 _HEADER_PATH = Path("coneskin") / "coneskin_board.h"
-_WORD_PATTERN = re.compile(r'"([^"]*)"|\{([^{}]*)\}|([^,{}\s]+)')
+_WORD_PATTERN = re.compile(r'"?([\w.-]+)"?')
 _NO_PIN = "NONE"
 
 
@@ -85,8 +87,7 @@ def converters() -> dict[str, Converter]:
     text = (firmware_folder() / _HEADER_PATH).read_text(encoding="utf-8")
     found = {}
     for name, row in _CONVERTER_PATTERN.findall(text):
-        words = (w[1] or w[2] for w in _WORD_PATTERN.findall(row))
-        bits, millivolts, _, _, _, extra, _, rate, permille, _, pull_down = words
+        bits, millivolts, _, _, _, extra, _, rate, permille, _, pull_down = _words(row)
         numbers = int(bits), 1e-3 * int(millivolts), int(extra), int(rate), int(permille)
         found[name] = Converter(name, *numbers, _pins(pull_down))
     return found
@@ -113,12 +114,17 @@ def board_header(converter: str = BUILT_IN) -> bytes:
 
 
 def _board(row: str) -> Board:
-    words = [listed or quoted or word for quoted, listed, word in _WORD_PATTERN.findall(row)]
-    name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = words
+    name, bits, baud, sense, current, supply, rail, ground, pull_down, select, common = _words(row)
     gates = _pins(rail), _pins(ground), _pins(pull_down)
-    common = "".join(_pins(common))
-    return Board(name, int(bits), int(baud), _pins(sense), current, supply, *gates, _pins(select), common)
+    return Board(
+        name, int(bits), int(baud), _pins(sense), current, supply, *gates, _pins(select), "".join(_pins([common]))
+    )
 
 
-def _pins(listed: str) -> tuple[str, ...]:
-    return tuple(pin for pin in listed.split(", ") if pin != _NO_PIN)
+def _words(row: str) -> Any:
+    """Return what stands in a row of a table, what is in braces as a list."""
+    return json.loads("[" + _WORD_PATTERN.sub(r'"\1"', row).replace("{", "[").replace("}", "]") + "]")
+
+
+def _pins(listed: Sequence[str]) -> tuple[str, ...]:
+    return tuple(pin for pin in listed if pin != _NO_PIN)

@@ -16,7 +16,7 @@ from coneskin.core.text import read_json
 from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.tables.sensor_tables import build_sensor
-from coneskin.skin.firmware.board_circuit import value_text
+from coneskin.skin.firmware.board_circuit import toml_lines
 
 from .folder import DESIGN_FILE
 
@@ -193,7 +193,7 @@ def first_scene(
                 lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
             if boards:
                 lines.append(f"# as the board has it ({boards[number].facts.title}):")
-                lines += [f"{key} = {value_text(value)}" for key, value in boards[number].keys.items()]
+                lines += toml_lines(boards[number].keys)
             lines.append("")
             number += 1
     if arm is not None and designs[0].thickness is not None:
@@ -210,7 +210,7 @@ def first_scene(
             limits["arm_silence_ms"] = _STALL_MS
     if limits:
         lines.append("[monitoring]" if ports else _MONITORING_TEXT)
-        lines += [*(f"{key} = {value_text(value)}" for key, value in limits.items()), ""]
+        lines += [*toml_lines(limits), ""]
     return "\n".join(lines)
 
 
