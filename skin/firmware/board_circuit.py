@@ -149,7 +149,8 @@ class BoardCircuit(NamedTuple):
             found |= {channel: f"ADC_{name}" for channel, name in zip(channels, "ABCDIS", strict=True)}
         for pins, net in ((board.rail, "HIGH_"), (board.ground, "LOW_")):
             found |= {pin: net + name for pin, name in zip(pins, "ABCD", strict=True)}
-        return found | {pin: f"DOWN_{name}" for pin, name in zip(board.pull_down, "CD", strict=True)}
+        found |= {pin: f"DOWN_{name}" for pin, name in zip(board.pull_down, "CD", strict=True)}
+        return {facts.pin_prefix + pin if pin.isdecimal() else pin: net for pin, net in found.items()}
 
 
 def toml_lines(values: Mapping[str, float | int | list[float]]) -> list[str]:
@@ -311,7 +312,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         yield filtered(supply, "100 nF")
         for e in "ABCD":
             yield two("R", "resistor", "100 kohm", gate + e, "GND")
-    group = "clamps"
+    group = "clamps, at J1"
     for wire in "ES":
         yield part("U", "clamp", **{f"IO{k}": f"{wire}_{e}" for k, e in enumerate("ABCD", 1)}, GND="GND")
     for e in "ABCD":
@@ -341,7 +342,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
             yield two("R", "resistor", "2.2 kohm", supply, net)
     elif circuit.board.common:
         numbers = (*circuit.board.sense, circuit.board.current, circuit.board.supply)
-        channels = {f"S{int(n) + 1}": net for n, net in zip(numbers, inputs, strict=True)}
+        channels = {f"S{int(n) + 1}": net for n, net in zip(numbers, inputs, strict=True)} | {"S7": "GND", "S8": "GND"}
         lines = {f"A{k}": f"MUX_{k}" for k in (0, 1, 2)}
         yield part("U", "multiplexer", **channels, **lines, D="MUX", EN="3V3", VDD="3V3", VSS="GND", GND="GND")
         yield filtered("3V3", "100 nF")

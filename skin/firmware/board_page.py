@@ -70,7 +70,7 @@ def _settings(circuit: BoardCircuit) -> str:
 _WIDTH, _FIRST_ROW, _ROW_HEIGHT, _GROUP_GAP = 1520, 100, 15, 26  # of the drawing; of a row, between two groups
 _COLUMN_GROUPS = (  # x, and what stands there from top to bottom
     (410, ("supply and current", "converter")),
-    (730, ("switches", "clamps")),
+    (730, ("switches", "clamps, at J1")),
     (1050, ("electrode A", "electrode B", "electrode C")),
     (1370, ("electrode D", "connector and test points")),
 )

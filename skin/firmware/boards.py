@@ -24,6 +24,7 @@ class BoardFacts(NamedTuple):
     clock_ppm: int  #: how far its clock may be off [ppm]
     rate: str  #: frames per second with the usual settings
     remark: str
+    pin_prefix: str = ""  #: of a pin's number, as it stands on the board
 
 
 _BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)

@@ -59,7 +59,8 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
         assert (folder / path.relative_to(product)).read_bytes() == path.read_bytes()
     row, page = boards()[board], (folder / "board.md").read_text(encoding="utf-8")
     drawn = [text.text for text in ET.parse(folder / "wiring.svg").iter("{http://www.w3.org/2000/svg}text")]
-    for pin in [*row.rail, *row.ground, *row.pull_down]:
+    prefix = "GP" if board == "pico" else ""
+    for pin in [prefix + pin for pin in (*row.rail, *row.ground, *row.pull_down)]:
         assert pin in drawn
         assert f"| {pin} | " in page
     parts = {row["names"].split()[0]: row for row in part_rows(folder)}
