@@ -41,6 +41,7 @@ _CONTACT_FAULTS = frozenset(
     }
 )
 _MAX_CONTRADICTIONS: Final = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
+_UNREADY_TIME: Final = 1.0  # s of a sensor that is neither touched nor quiet, after which it says so: it is not ready
 _CONTRADICTION_DECAY: Final = 0.1  # frames; each good frame takes so many off the count
 
 
@@ -267,10 +268,12 @@ class Detector:
         if self._level.exhausted(whole):
             self._report(events, Fault.DRIFT, frame, now, f"{whole:+.3f} of the level")
         if level >= self.sensor.thresholds.release_level:  # neither touched nor quiet: no drift is learned from it
-            self._quiet = 0
+            self._quiet = min(self._quiet, 0) - 1  # frames in a row that are neither, negative
             self._skip()
+            if -self._quiet * self.timing.period > (settings.lasting_touch if self.ready else _UNREADY_TIME):
+                self._report(events, Fault.DRIFT, frame, now, f"{whole:+.3f} of the level, for long")
             return
-        self._quiet += 1
+        self._quiet = max(self._quiet, 0) + 1
         if self._diagnosis.active:
             self._diagnosis.end()
         self._leak.feed(frame, whole)

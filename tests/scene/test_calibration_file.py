@@ -61,7 +61,7 @@ def test_a_scene_takes_the_newest_calibration_of_its_device(tmp_path: Path) -> N
     scene = load_scene(saved(tmp_path))
     found = scene.sensors[0].sensor.place_map
     assert found is not None
-    assert (found.along, found.around) == (ALONG, AROUND)
+    assert (found.along, found.around, found.sheet_ohms) == (ALONG, AROUND, (990.0, 1010.0))
     assert summarize(scene)["calibration of skin"].startswith(
         "device-7.json of 2026-11-22, 9 touches, 1.50 mm became 0.31"
     )

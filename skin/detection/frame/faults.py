@@ -44,9 +44,9 @@ class Fault(Enum):
     OUT_OF_RANGE = "the potential at the contact lies outside the driven range"
     # between frames (detector.py)
     LAYERS_CLOSED = (
-        "the layers stay in contact: something rests on the sensor, they are stuck, or two of their wires are joined"
+        "the layers stay in contact: something rests on the sensor, they are stuck or damp, or two wires are joined"
     )
-    DRIFT = "the level of the untouched sensor has drifted too close to the touch threshold"
+    DRIFT = "the level of the untouched sensor is too close to the touch threshold: it is damp, or something lies on it"
     CURRENT_CHANGED = (
         "a drive current of the untouched sensor has changed: a sheet or an electrode is damaged, or a touch is not "
         "seen"

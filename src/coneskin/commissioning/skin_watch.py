@@ -77,14 +77,9 @@ class SkinWatch:
         It is the mean since the watch was opened, up to now; the leads are taken to be those of the scene.
         """
         count, radial, angular = self._drawn[sensor.device_id, sensor.sensor_id]
-        parts = sensor.electronics
-        siemens = parts.current_full_scale / parts.adc_volts  # of a current over the supply, both in counts
         zeros = {detector.sensor.name: detector.zero for detector in self._stream.detectors}
-        zero = zeros[sensor.name] / parts.count_volts(parts.supply_volts)
-        a, b, c, d = parts.lead_ohms
-        upper = (1.0 / ((radial / count - zero) * siemens) - a - b) * sensor.upper_sheet_ohms / sensor.radial_ohms
-        lower = (1.0 / ((angular / count - zero) * siemens) - c - d) * sensor.lower_sheet_ohms / sensor.angular_ohms
-        return upper, lower
+        zero = zeros[sensor.name] / sensor.electronics.count_volts(sensor.electronics.supply_volts)
+        return sensor.sheet_ohms(radial / count - zero, angular / count - zero)
 
     def contradiction(self, sensor: str) -> str:
         """Return why a sensor's places must not be believed although they look right; empty where they may be.

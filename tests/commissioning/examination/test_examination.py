@@ -142,6 +142,7 @@ def _touch(
         ({"imperfections": Imperfections(clock_ratio=2.0)}, "skin, clock", "bad", "2.000 device seconds in a second"),
         ({"imperfections": Imperfections(noise_counts=0.0)}, "skin, noise", "bad", "radial_current 0.0"),
         ({"imperfections": Imperfections(noise_counts=12.0)}, "skin, noise", "warning", "touch_supply 1"),
+        ({"imperfections": Imperfections(leak=2e-5)}, "skin, guides", "bad", "; 20 uS join the layers"),
         ({"imperfections": Imperfections(supply_ratio=0.8)}, "skin, supply", "bad", "2482 counts"),
         ({"rate_hz": 150.0}, "skin, rate", "warning", "150 frames/s"),
         ({"rate_hz": 50.0}, "skin, rate", "bad", "50 frames/s"),
@@ -192,6 +193,26 @@ def test_another_sheet_resistance_is_named_with_what_to_write() -> None:
     assert finding(examine(touches=False, wires="ACBD"), "skin, radial current").remedy == (
         "no current: the wires of A and B are open, or on the electrodes of both sheets"
     )
+
+
+@pytest.mark.parametrize(
+    ("upper", "lower", "verdict", "said"),
+    [
+        (1.003, 1.0, "ok", ""),
+        (1.015, 1.0, "warning", "the upper sheet, or its bond to A or B"),  # a fifth of an electrode has peeled off
+        (1.0, 0.97, "warning", "the lower sheet, or its bond to C or D"),
+        (1.03, 1.03, "ok", ""),  # another day's warmth
+        (1.08, 1.08, "warning", "both sheets have"),
+    ],
+)
+def test_a_sheet_that_is_not_what_it_was_at_the_calibration_is_named(
+    upper: float, lower: float, verdict: str, said: str
+) -> None:
+    text = TEXT.replace("wrap_deg = 330", "wrap_deg = 330\nmap_along = [0, 0, 0, 0, 0, 0]\nmap_sheet_ohm = [980, 1010]")
+    plain = parse_scene(TEXT).sensors[0].sensor
+    made = replace(plain, upper_sheet_ohms=980.0 * upper, lower_sheet_ohms=1010.0 * lower)
+    found = finding(examine(text, touches=False, sensors=made), "skin, calibration")
+    assert (found.verdict, said in found.remedy) == (verdict, True)
 
 
 def test_a_skin_with_another_number_is_named() -> None:

@@ -67,3 +67,16 @@ def test_a_leak_of_100_kohm_is_no_fault_and_a_touch_is_seen_through_it():
     ]
     assert detector.ready
     assert max(baselines) == pytest.approx(DetectorSettings().drift_limit)
+
+
+def test_damp_between_the_thresholds_is_the_reason_why_a_sensor_is_not_ready_or_no_longer():
+    skin = VirtualSkin(SENSOR, rate_hz=50.0, duration=3.0, model="ladder", imperfections=Imperfections(leak=2e-5))
+    events, detector, _ = play(skin)
+    assert [event.fault for event in events if isinstance(event, SkinFault)] == [Fault.DRIFT]
+    assert not detector.ready
+    # a touch lighter than the threshold is none for half a minute, and then something that lies on the sensor
+    for seconds, faults in ((25.0, []), (40.0, [Fault.DRIFT])):
+        light = ScriptedTouch(1.0, 100.0, 0.1, 2.0, force=0.51)
+        events, detector, _ = play(VirtualSkin(SENSOR, [light], rate_hz=50.0, duration=seconds, model="ladder"))
+        assert [event.fault for event in events if isinstance(event, SkinFault)] == faults
+        assert not detector.touched

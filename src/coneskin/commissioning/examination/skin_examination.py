@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.finding import Finding, Verdict, judged
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
@@ -75,8 +76,10 @@ _CLOCK_ERROR = 0.01  # part by which the device's clock may be off as far as a f
 _MAX_LOST = 0.02  # part of the frames, as the detector allows
 _NEAR_FACTOR, _FAR_FACTOR = 1.25, 2.0  # factors between a current and the design's: remarkable, refused
 _GUIDE_NOISE = 0.01  # of the supply, on an untouched guide
+_LEAST_LEAK, _MIDDLE = 2e-7, 0.1  # S between the layers that is no noise; part of a side, where that of damp is
 _SUPPLY_ERROR = 0.10  # of the supply
 _MAX_NOISE = 8.0  # counts of 12 bits
+_CHANGED_SHEET, _CHANGED_SHEETS = 0.01, 0.05  # part by which one sheet, and both, may differ from the calibration
 _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
@@ -134,6 +137,7 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
         *_levels(sensor, seen),
         *_noise(sensor, seen),
         *_currents(sensor, seen),
+        *_since_calibration(sensor, seen),
     ]
 
 
@@ -172,6 +176,12 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     worst, part = max(parts_of_supply.items(), key=operator.itemgetter(1))
     remedy = "nothing may touch it now; else shield the wires, lower input_ohm, look for a short"
     value = f"at most {100.0 * part:.2f} % of the supply, on {worst}"
+    means = [statistics.fmean(counts) for counts in zip(*(frame[6:18] for frame in seen.frames), strict=True)]
+    matrix = FrameInversion(sensor).invert(means) if min(means[-3:]) > 0.0 else None
+    if matrix is not None and matrix.conductance > _LEAST_LEAK:
+        value += f"; {1e6 * matrix.conductance:.2g} uS join the layers"
+        if max(abs(matrix.x - 0.5), abs(matrix.y - 0.5)) < _MIDDLE:
+            remedy = "nothing may touch it now; else it is damp all over: dry it, and seal its edges"
     found.append(judged(f"{name}, guides", part <= _GUIDE_NOISE, value, "untouched: at most 1 %", remedy))
     if status := functools.reduce(operator.or_, seen.counts("status")) & _STATUS_FAULTS:
         value = f"the device reports {', '.join(bit.name or str(bit.value) for bit in Status if bit & status)}"
@@ -209,3 +219,25 @@ def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
         value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR_FACTOR:g} times"
         found.append(judged(f"{sensor.name}, {phase} current", verdict, value, rule, remedy))
     return found
+
+
+def _since_calibration(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
+    """Compare the untouched sheets with what they were when the sensor was calibrated."""
+    if sensor.place_map is None or not sensor.place_map.sheet_ohms:
+        return []
+    mean = {name: statistics.fmean(seen.counts(name)) for name in _CHANNELS}
+    zero = mean["touch_current"] - sensor.bounds.touch_current_per_guide * (mean["touch_c"] + mean["touch_d"])
+    drawn = [(mean[f"{phase}_current"] - zero) / max(mean["touch_supply"], 1.0) for phase in ("radial", "angular")]
+    if not min(drawn) > 0.0:
+        return []  # which is another finding
+    ohms = zip(sensor.sheet_ohms(*drawn), sensor.place_map.sheet_ohms, strict=True)
+    upper, lower = (now / learned - 1.0 for now, learned in ohms)
+    value = f"ohm per square since then: upper {100.0 * upper:+.1f} %, lower {100.0 * lower:+.1f} %"
+    one = abs(upper - lower) > _CHANGED_SHEET
+    good = not one and max(abs(upper), abs(lower)) <= _CHANGED_SHEETS
+    sheet, wires = ("upper", "A or B") if abs(upper) > abs(lower) else ("lower", "C or D")
+    remedy = f"the {sheet} sheet, or its bond to {wires}, has changed (peeled, damp, torn): look at it, calibrate again"
+    if not one:
+        remedy = "the gain of the current has changed, or both sheets have (warmth, damp): calibrate again"
+    rule = f"one within {100 * _CHANGED_SHEET:g} % of the other, both within {100 * _CHANGED_SHEETS:g} %"
+    return [judged(f"{sensor.name}, calibration", "ok" if good else "warning", value, rule, remedy)]

@@ -136,6 +136,7 @@ CALIBRATION_KEYS = with_meanings(
     map_around: what a calibration takes off places about the axis; `calibration` gives it
     map_error_mm: standard deviation of a calibrated place, along and around; `calibration` gives it
     map_note: where `map_along` and `map_around` come from
+    map_sheet_ohm: resistance of the upper and lower sheet per square at the calibration; `calibration` gives it
     forces_n: known forces of a calibration, rising; `calibration` gives them
     force_levels: levels that the known forces gave
     force_error: standard deviation of a force that is read, as a share of it
@@ -144,6 +145,7 @@ CALIBRATION_KEYS = with_meanings(
     Key("map_around", list, None, low=-0.15, high=0.15, length=6),
     Key("map_error_mm", float, None, low=0.0, high=100.0),
     Key("map_note", str, ""),
+    Key("map_sheet_ohm", list, None, low=1e-3, high=1e9, length=2),
     Key("forces_n", list, None, low=0.0, high=1000.0),
     Key("force_levels", list, None, low=0.0, high=1.0),
     Key("force_error", float, 0.0, low=0.0, high=0.99),

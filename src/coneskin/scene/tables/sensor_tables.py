@@ -168,7 +168,7 @@ def _place_map(frustum: Frustum, values: Mapping[str, Any]) -> PlaceMap | None:
         return None
     from coneskin.skin.calibration import PlaceMap
 
-    return PlaceMap(frustum, along or (0.0,) * 6, around or (0.0,) * 6, values["map_note"])
+    return PlaceMap(frustum, along or (0.0,) * 6, around or (0.0,) * 6, values["map_note"], values["map_sheet"] or ())
 
 
 def _force_table(values: Mapping[str, Any]) -> ForceTable | None:
