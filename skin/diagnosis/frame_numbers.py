@@ -19,6 +19,7 @@ _STEADY_SHARE = 0.9  # of the steps that must be of one kind
 _MIN_RATE = 100.0  # Hz
 _CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
 _HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
+_HELD_UP = 0.03  # s of frames that are read at once: no adapter's latency timer is as long
 _LOST_SHARE = 0.02  # share of frames
 _REPEATED_SHARE, _UNCOUNTED_SHARE = 0.01, 0.01  # a guard stops at each
 _CHANCE_FRAMES = 3  # frames that may be chance
@@ -36,12 +37,14 @@ class FrameNumbers:
         clock_ratio: speed of the device's clock over that of the host; nan where it is not known.
         missing: share of the sequence numbers that never came.
         period: device time from frame to frame, the middle one [s].
+        held_up: for how long this computer has left frames unread, by those that it then read at once [s].
     """
 
     rate: float
     clock_ratio: float
     missing: float
     period: float
+    held_up: float
 
 
 def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNumbers:
@@ -57,7 +60,19 @@ def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNum
     forward = [step for step in steps if 0 < step < 0x8000]
     missing = sum(step - 1 for step in forward) / max(1, sum(forward))
     middle = median_high(ticks) * 1e-6 if ticks else 0.0
-    return FrameNumbers(rate, _slope(ticks, times) if seconds >= _MIN_TIME else math.nan, missing, middle)
+    ratio = _slope(ticks, times) if seconds >= _MIN_TIME else math.nan
+    return FrameNumbers(rate, ratio, missing, middle, _held_up(ticks, times))
+
+
+def _held_up(ticks: Sequence[int], times: Sequence[float]) -> float:
+    total = span = gap = 0.0
+    for tick, (before, now) in zip([*ticks, 0], itertools.pairwise([*times, math.inf]), strict=True):
+        if now == before:
+            span += 1e-6 * tick
+            continue
+        total += max(span, gap) if span > _HELD_UP else 0.0
+        span, gap = 0.0, now - before
+    return total
 
 
 def _sequence_steps(frames: Sequence[Frame]) -> list[int]:
@@ -158,7 +173,10 @@ def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameN
             return cause.found(f"the device's clock counts {unit}")
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
         ratio = _steady_ratio(ticks, times, ratio)
-    if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
+    off, held, total = abs(ratio - 1.0), numbers.held_up, times[-1] - times[0]
+    if off > _CLOCK_TOLERANCE and off * (total - held) <= held:
+        return Cause.HELD_UP.found(f"this computer held frames up for {1e3 * held:.0f} ms, which hides the clock")
+    if off > _CLOCK_TOLERANCE:
         return Cause.CLOCK_RATIO.found(f"the device's clock runs {ratio:.3f} times as fast as the computer's")
     period = 1e6 * numbers.period
     steps = zip(_sequence_steps(frames), ticks, strict=True)
@@ -195,7 +213,10 @@ def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) ->
 
 def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:
     if numbers.missing > _LOST_SHARE:
-        return Cause.FRAMES_LOST.found(f"{100.0 * numbers.missing:.1f} % of the frames never come")
+        lost, held = f"{100.0 * numbers.missing:.1f} % of the frames never come", numbers.held_up
+        if held:
+            return Cause.HELD_UP.found(f"{lost}, and this computer held others up for {1e3 * held:.0f} ms")
+        return Cause.FRAMES_LOST.found(lost)
     if numbers.rate < _MIN_RATE:
         return Cause.RATE_LOW.found(f"a sensor sends only {numbers.rate:.1f} frames a second")
     groups = sorted({*times})

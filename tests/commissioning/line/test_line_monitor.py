@@ -12,6 +12,7 @@ from coneskin.commissioning.line.line_monitor import (
     draw_screen,
     draw_sheet,
 )
+from coneskin.core.finding import Finding
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.sensor import Sensor
@@ -95,6 +96,26 @@ def test_a_computer_that_is_held_up_is_not_the_fault_of_the_board(
         monitor.feed(data, now)
     found = monitor.report(now).diagnosis
     assert (found.item == Cause.CLOCK_RATIO.key) == (cause is Cause.CLOCK_RATIO), found.line
+
+
+def test_a_computer_that_loses_frames_while_it_is_held_up_is_named() -> None:
+    """It reads nothing for half a second, the newest tenth of which the port has kept; twice in two seconds."""
+
+    def named(held: float) -> Finding:
+        monitor, now = LineMonitor(0.0, (), 921600), 0.0
+        for time, data in a_skin().packets():
+            if time > 2.0:
+                break
+            ends = next((end for end in (0.7, 2.0) if end - held <= time < end), time)
+            if not ends - time > 0.1:
+                now = max(now, ends)
+                monitor.feed(data, now)
+        return monitor.report(now).diagnosis
+
+    assert named(0.0).item == Cause.NONE.key
+    found = named(0.5)
+    assert found.item == Cause.HELD_UP.key
+    assert "this computer held" in found.line
 
 
 def test_a_line_says_the_diagnosis_first_and_an_object_everything() -> None:

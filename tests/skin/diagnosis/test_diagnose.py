@@ -95,7 +95,7 @@ def test_the_names_of_crcs_are_those_of_the_catalogue() -> None:
 
 def test_every_other_cause_is_in_the_corpus() -> None:
     rare = {Cause.FEW_BYTES, Cause.NIBBLES_SWAPPED, Cause.WORDS_SWAPPED, Cause.UBX, Cause.CRC_UNKNOWN}
-    rare |= {Cause.CLOCK_SECONDS} | {Cause.SEQUENCE_RANDOM, Cause.SUPPLY_OFF, Cause.CURRENT_OFF}
+    rare |= {Cause.CLOCK_SECONDS, Cause.HELD_UP} | {Cause.SEQUENCE_RANDOM, Cause.SUPPLY_OFF, Cause.CURRENT_OFF}
     assert {*Cause} - {*MISTAKES.values()} - {*NOT_TO_BE_NAMED.values()} == rare
 
 
