@@ -150,13 +150,12 @@ def bounded(step: float, most: float) -> float:
 
 
 _ZERO_LIMIT: Final = 0.012  # of full scale, that the zero may be off; 0.8 mV before an amplifier of 50, at 3.3 V
-_ZERO_REST: Final = 1  # count, by which it may be off and is not followed: untouched readings are cut off at 0
-_ZERO_STEP: Final = 1.0  # s, in which it is followed by a count
+_ZERO_STEP: Final = 1.0  # s, in which it is followed by a unit; by less it may be off: untouched readings end at 0
 _ZERO_TIME: Final = 0.5  # s of a look at one that is known: hum of 3 Hz and more goes up and down in it,
 _ZERO_TURN: Final = (
     0.618  # of the time between two of its frames, by which the next is longer: mains stand still in none
 )
-_ZERO_SPREAD: Final = 6.0  # counts of the middle 80 %, more than the noise that most boards have
+_ZERO_SPREAD: Final = 6.0  # units of the middle 80 %, more than the noise that most boards have
 
 
 class UntouchedZero:
@@ -181,6 +180,7 @@ class UntouchedZero:
         self._full = parts.full_count
         self.nominal = self.counts = round(parts.current_zero / parts.current_full_scale * self._full)
         self.most = round(_ZERO_LIMIT * self._full)
+        self._unit = max(1, round(self._full / 4095))  # counts: one of 12 bits or less, its share of more
         self._per_guide = bounds.touch_current_per_guide
         self._seen: list[float] = []
         self._waited = self._since = 0.0
@@ -206,7 +206,7 @@ class UntouchedZero:
             return False
         seen.sort()
         median, spread = round(seen[CURRENT_BLOCK // 2]), seen[-CURRENT_BLOCK // 10] - seen[CURRENT_BLOCK // 10]
-        free = not self.known or (free and spread < _ZERO_SPREAD)  # what swings is followed slowly
+        free = not self.known or (free and spread < _ZERO_SPREAD * self._unit)  # what swings is followed slowly
         self.known = True
         self.hidden = seen[-1] <= 0.0
         seen.clear()
@@ -215,14 +215,14 @@ class UntouchedZero:
         if self.most < abs(off) <= 4 * self.most:  # beyond, no amplifier is the cause
             self.excess = f"{100.0 * off / self._full:+.2f} % of full scale, at most {100.0 * _ZERO_LIMIT:.1f} %"
         change = median - self.counts
-        if not -self.most <= off <= self.most or -_ZERO_REST <= change <= _ZERO_REST:
+        if not -self.most <= off <= self.most or -self._unit <= change <= self._unit:
             return False
         if free:
             self.counts = median
             return True
         if self._waited >= _ZERO_STEP:
             self._waited = 0.0
-            self.counts += 1 if change > 0 else -1
+            self.counts += self._unit if change > 0 else -self._unit
         return False
 
     def lacks(self, frame: Frame) -> bool:

@@ -80,17 +80,23 @@ def frames(count, number=CURRENT_BLOCK):
     return [frame._replace(touch_current=count)] * number
 
 
-def test_it_is_found_at_once_and_followed_slowly_once_somebody_relies_on_it():
-    zero = UntouchedZero(PLAIN)
-    assert [zero.feed(frame, 0.005, free=True) for frame in frames(20)].count(True) == 1
+@pytest.mark.parametrize(("bits", "unit"), [(10, 1), (12, 1), (16, 16)])
+def test_it_is_found_at_once_and_followed_slowly_once_somebody_relies_on_it(bits, unit):
+    zero = UntouchedZero(replace(PLAIN, electronics=replace(PLAIN.electronics, adc_bits=bits)))
+    start, later, near = 7 * unit, 12 * unit, 10 * unit  # the share of the scale is what counts, beyond 12 bits
+    assert [zero.feed(frame, 0.005, free=True) for frame in frames(start)].count(True) == 1
     for _ in range(19):  # 3.04 s
-        for frame in frames(40):
+        for frame in frames(later):
             zero.feed(frame, 0.005, free=False)
-    assert zero.counts == 22
-    for _ in range(40):  # within a count it rests
-        for frame in frames(23):
+    assert zero.counts == 9 * unit
+    for _ in range(40):  # within a unit it rests
+        for frame in frames(near):
             zero.feed(frame, 0.005, free=False)
-    assert zero.counts == 22
+    assert zero.counts == 9 * unit
+    noisy = [frames(start + round(unit * off), 1)[0] for off in (-1.0, 0.0, 1.0)]
+    for n in range(8 * CURRENT_BLOCK):  # noise of its share hides nothing while nobody relies on it
+        zero.feed(noisy[n % 3], 0.005, free=True)
+    assert zero.counts == start
 
 
 def run(offset_at, seconds=8.0, rate=500, sensor=BIASED, touches=()):
