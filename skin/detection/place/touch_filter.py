@@ -22,6 +22,7 @@ _SMOOTHED_VARIANCE: Final = _SMOOTHING_GAIN / (2.0 - _SMOOTHING_GAIN)
 _MOVED_VARIANCE: Final = 16.0  # four standard deviations, squared: once in 16 000 independent frames by chance
 _JUMPED_VARIANCE: Final = 36.0  # six, of one frame alone
 _USUAL_SPEED: Final = 0.3  # m/s; standard deviation of the velocity of a touch that moves
+_SLOW_PART: Final = 0.01  # of its variance, a slow slide's: the place does not follow it early, its doubt does
 _TOLD_CHANCE: Final = 0.999  # chance that it moves, from which on a velocity is told
 _PHASE_SKEW: Final = 1.0 / 6.0  # of a frame; standard deviation of the moment at which its place was
 
@@ -127,13 +128,20 @@ class TouchFilter:
         mean_x, mean_y = x0 * share, y0 * share
         step_x, step_y = (x1 + lag * x0) * by_noise, (y1 + lag * y0) * by_noise
         doubt_x, doubt_y = xx * by_noise, yy * by_noise
-        odds = (1.0 + usual_x / doubt_x) * (1.0 + usual_y / doubt_y)
+        fast_x, fast_y = usual_x / doubt_x, usual_y / doubt_y
+        odds = (1.0 + fast_x) * (1.0 + fast_y)
+        slow_odds = (1.0 + _SLOW_PART * fast_x) * (1.0 + _SLOW_PART * fast_y)
         seen = step_x * step_x / doubt_x + step_y * step_y / doubt_y
-        moves = 1.0 if seen > 200.0 else 1.0 / (1.0 + math.sqrt(odds) * math.exp(-0.5 * seen))
+        moves = slides = 1.0
+        if seen < 200.0:
+            chance = math.exp(-0.5 * seen)
+            moves = 1.0 / (1.0 + math.sqrt(odds) * chance)
+            slides = 1.0 / (1.0 + math.sqrt(slow_odds) * chance)
         self._step = moves * step_x, moves * step_y
         self.share = share + moves * lag * lag * by_noise
         self._ahead = share + moves * (lag + 1.0) * (lag + 1.0) * by_noise
-        unsure = moves * (1.0 - moves) * lag * lag + moves * _PHASE_SKEW * _PHASE_SKEW
+        # behind a slide by 1 - moves of its way, ahead of what rests by moves
+        unsure = (moves * moves + slides * (1.0 - 2.0 * moves)) * lag * lag + moves * _PHASE_SKEW * _PHASE_SKEW
         self.motion = unsure * step_x * step_x, unsure * step_x * step_y, unsure * step_y * step_y
         self.velocity = (step_x, step_y, 0.0) if moves > _TOLD_CHANCE else (0.0, 0.0, 0.0)
         return first_x + mean_x + moves * lag * step_x, first_y + mean_y + moves * lag * step_y
