@@ -55,6 +55,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="few plants and cases, under a minute")
     parser.add_argument("--several", type=int, help="presses by more than one contact")
+    parser.add_argument("--electronics", help="with which alone these are measured")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them")
     parser.add_argument("--collisions", type=int, default=300, help="collisions, end to end (%(default)s)")
     parser.add_argument("--places", type=int, help="places in each cell")
@@ -91,7 +92,8 @@ def main() -> int:
         goals += tables.show_cells(found)
     if "several" in parts:
         count = args.several or (64 if quick else 4000)
-        for electric in ("16 bit, matched",) if quick else ("12 bit, 20 mA", "12 bit, matched", "16 bit, matched"):
+        every = ("16 bit, matched",) if quick else ("12 bit, 20 mA", "12 bit, matched", "16 bit, matched")
+        for electric in (args.electronics,) if args.electronics else every:
             goals.append(tables.show_several(electric, several.measure(plants, count, electric, args.first)))
             note(f"several contacts, {electric}")
     if "power" in parts:

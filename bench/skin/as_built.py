@@ -6,6 +6,10 @@
 Each row draws skins whose flaws have the size of the row as their standard deviation; the decoder is told that size, or
 "film" where it has no such number. Sheets: `skin/virtual/built_sheets`. The circuit is a nodal analysis of its own, and
 the frames go as bytes into a stream. Four contacts a skin, 40 frames each, from the third on, then 100 without.
+
+What can be known at all is the Fisher information of the counts of nine touches, 40 frames each: the Cramer-Rao
+deviation of how much of an effect there is, its form known, over its size. Radius, conductance and supply are free.
+Below a half it shows. What comes after learning has the touches alone, all else the untouched sensor as well.
 """
 
 from __future__ import annotations
@@ -21,8 +25,11 @@ import numpy as np
 
 from bench.decode.cells import electronics
 from bench.decode.plants import SHEETS
-from bench.decode.runs import FRAME_PERIOD, LEARNED_FRAMES, Sitting, decode
+from bench.decode.runs import FRAME_PERIOD, LEARNED_FRAMES, Sitting, decode, packet
 from bench.report import head, quantile, show
+from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.examination.skin_examination import SkinStatistics, examine_sensor
+from coneskin.skin.calibration import PlaceMap
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, IDEAL_SHEETS, SheetTolerance
 from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, draw_flaws
@@ -38,6 +45,12 @@ ELLIPSE_CHI2 = 5.991
 GUIDES = (0, 1, 3, 4, 6, 7)  # of the ten counts
 CURRENTS = (2, 5, 8)
 TAIL_COUNT = 100  # frames after a touch, in which a change of the untouched currents shows
+SHOWN = 0.5  # Cramer-Rao deviation over the size of an effect, below which it can be known
+KNOWN_SKINS = 6  # drawn for it; the median is told
+MARK_ERROR, PLACE_ERROR = 3e-4, 1.0  # m; of a mark, and of a place that nobody knows
+KNOWN_OHMS, MAKERS_OHMS = 3e-4, 0.2  # ratio; of the sheets, as a calibration has learned them, and as a maker says
+RADIUS_ERROR, SIEMENS_ERROR = 0.5, 1.0  # of the logarithms
+STEP = 1e-3  # of a logarithm, and of a place 0.2 mm, for derivatives
 Frames = np.ndarray
 
 
@@ -147,23 +160,22 @@ def measure(row: Row, skins: int) -> list[str]:
     for seed in range(skins):
         rng = random.Random(f"{row.name} {seed}")
         noise = np.random.default_rng(seed)
-        circuit = replace(base, leads=tuple(1.0 + abs(rng.gauss(0.0, row.leads)) for _ in range(4)))
-        flaws = draw_flaws(row.sheets, seed)
-        if row.peeled:
-            flaws = replace(flaws[0], peeled=row.peeled), flaws[1]
-        ideal = flaws == (SheetFlaws(seed=flaws[0].seed), SheetFlaws(seed=flaws[1].seed))
+        circuit, sheets = _specimen(row, seed, rng, base, exact_field)
         sitting = Sitting(plant, circuit, np.zeros((0, 10)), np.zeros((0, 0, 10)), tolerance=row.told)
         sensor = sitting.sensor()
-        sheets = exact_field if ideal else BuiltSheets(flaws, exact_field)
         places = [_places(sensor, rng, row.speed) for _ in range(PLACE_COUNT)]
         still = np.array(sheets.admittances(sensor, [[]])[0])
-        learned = np.array(exact_field.admittances(sensor, [[]])[0]) if row.late else still
+        intact = np.array(exact_field.admittances(sensor, [[]])[0])
+        learned = intact if row.late else still
         change = row.change or (lambda exact, *_: exact)
         quiet = change(np.repeat(circuit.exact(learned)[None], LEARNED_FRAMES, 0), random.Random(seed), circuit)
         sitting.untouched = circuit.counts(quiet, 1, noise)[:, 0]
         touches = np.array([_touch(sheets, sensor, way, rng, row, still) for way in places])
         frames = change(circuit.exact(touches), random.Random(seed), circuit)
         sitting.touches = circuit.counts(frames, 1, noise)[:, :, 0]
+        if row.peeled and not row.late:
+            whole = circuit.counts(np.repeat(circuit.exact(intact)[None], LEARNED_FRAMES, 0), 1, noise)
+            names[_doctor(sensor, whole[:, 0], sitting.untouched)] += PLACE_COUNT
         try:
             said = decode(sitting)
         except RuntimeError as error:
@@ -186,6 +198,107 @@ def measure(row: Row, skins: int) -> list[str]:
     held = f"{np.mean(inside):.3f}" if inside else "-"
     told = [f"{name} {count / len(certain):.2f}" for name, count in names.most_common(2)]
     return [row.name, off, held, f"{np.mean(certain):.2f}", ", ".join(told) or "-"]
+
+
+def _doctor(sensor: Sensor, before: np.ndarray, now: np.ndarray) -> str:
+    """Return what coneskin doctor names of a sensor that was calibrated with other untouched frames."""
+    ohms = sensor.sheet_ohms(*(float(np.mean(before[:, k] / before[:, 9])) for k in (5, 8)))
+    seen = SkinStatistics(0.0)
+    for number, counts in enumerate(now.tolist()):
+        seen.add(FRAME_PERIOD * number, packet(number, counts))
+    calibrated = replace(sensor, place_map=PlaceMap(sensor.frustum, sheet_ohms=ohms))
+    found = examine_sensor(calibrated, seen.sensors[0, 0], 0.0, 0.1)
+    (named,) = (one for one in found if one.item.endswith("calibration"))
+    return f"doctor: {named.remedy.partition(',')[0] or 'nothing'}"
+
+
+def _specimen(
+    row: Row, seed: int, rng: random.Random, base: ConverterPlant, exact_field: FieldContacts
+) -> tuple[ConverterPlant, BuiltSheets | FieldContacts]:
+    """Draw a skin."""
+    circuit = replace(base, leads=tuple(1.0 + abs(rng.gauss(0.0, row.leads)) for _ in range(4)))
+    flaws = draw_flaws(row.sheets, seed)
+    if row.peeled:
+        flaws = replace(flaws[0], peeled=row.peeled), flaws[1]
+    ideal = flaws == (SheetFlaws(seed=flaws[0].seed), SheetFlaws(seed=flaws[1].seed))
+    return circuit, exact_field if ideal else BuiltSheets(flaws, exact_field)
+
+
+class Knowledge:
+    """Fisher information of the counts of nine touches, one at each mark, and of the untouched sensor before them."""
+
+    def __init__(self) -> None:
+        self.base, self.field = electronics(NAME)[ELECTRIC], FieldContacts()
+        self.sensor = Sitting(SHEETS[NAME], self.base, np.zeros((0, 10)), np.zeros((0, 0, 10))).sensor()
+        marks = (mark.place for mark in calibration_marks(self.sensor))
+        self.marks = [LayerContact(*place, 2e-3, 5e-3, 5e-3) for place in marks]
+        self.ideal = self.admittances(self.field)
+        self.exact = self.base.exact(self.ideal)
+        turn = 0.2 * STEP / self.sensor.frustum.radius1
+        contacts = (
+            (0.2 * STEP, lambda c: c._replace(u=c.u + 0.2 * STEP)),
+            (0.2 * STEP, lambda c: c._replace(phi=c.phi + turn)),
+            (STEP, lambda c: c._replace(radius=c.radius * (1.0 + STEP), reach=c.reach * (1.0 + STEP))),
+            (STEP, lambda c: c._replace(conductance=c.conductance * (1.0 + STEP))),
+        )
+        # each touch has its own; the supply of each scene is measured with it
+        self.own = [(self.moved(self.sensor, move) - self.exact) / size for size, move in contacts]
+        self.own.append(self.exact)
+        grown = {name: getattr(self.sensor, name) * (1.0 + STEP) for name in ("upper_sheet_ohms", "lower_sheet_ohms")}
+        sheets = (replace(self.sensor, **{name: value}) for name, value in grown.items())
+        self.shared = [(self.moved(made, lambda c: c) - self.exact) / STEP for made in sheets]
+
+    def admittances(self, sheets: BuiltSheets | FieldContacts) -> np.ndarray:
+        """Return Y untouched, and touched at each mark."""
+        return np.array(sheets.admittances(self.sensor, [[], *([mark] for mark in self.marks)]))
+
+    def moved(self, sensor: Sensor, move: Callable[[LayerContact], LayerContact]) -> np.ndarray:
+        """Return the exact counts with other contacts, or of other sheets."""
+        scenes: list[list[LayerContact]] = [[], *([move(mark)] for mark in self.marks)]
+        return self.base.exact(np.array(self.field.admittances(sensor, scenes)))
+
+    def effect(self, row: Row, seed: int) -> np.ndarray:
+        """Return what an effect of its usual size adds to the counts."""
+        rng = random.Random(f"{row.name} {seed}")
+        circuit, sheets = _specimen(row, seed, rng, self.base, self.field)
+        upper, lower = row.warmed[0] + sum(row.stepped) / 2.0, row.warmed[1]
+        warmed = self.ideal[0] * np.array([upper, upper, lower, lower])
+        y = (self.ideal if sheets is self.field else self.admittances(sheets)) - warmed + leak_admittance(row.damp)
+        exact = circuit.exact(y)
+        return (row.change(exact, rng, circuit) if row.change else exact) - self.exact
+
+    def deviation(self, effect: np.ndarray, place: float, ohms: float, after: bool) -> float:
+        """Return the Cramer-Rao deviation of how much of an effect there is, over its size.
+
+        Args:
+            effect: what it adds to the counts.
+            place: standard deviation of each touch's place [m].
+            ohms: that of the sheets' resistances, a ratio.
+            after: it comes after the untouched sensor was measured.
+        """
+        frames = np.array([0.0 if after else LEARNED_FRAMES, *[FRAME_COUNT] * len(self.marks)])
+        columns = [effect, *self.shared]
+        priors = [0.0, ohms**-2, ohms**-2]
+        for k in range(len(frames)):
+            alone = (np.arange(len(frames)) == k)[:, None]
+            columns += [one * alone for one in self.own]
+            priors += [place**-2, place**-2, RADIUS_ERROR**-2, SIEMENS_ERROR**-2, 1.0]
+        slopes = np.array([(np.sqrt(frames)[:, None] * one).ravel() for one in columns])
+        information = slopes @ slopes.T / (self.base.noise**2 + 1.0 / 12.0) + np.diag(priors)
+        unit = np.sqrt(np.maximum(np.diag(information), 1e-30))
+        scaled = np.linalg.pinv(information / np.outer(unit, unit), rcond=1e-14, hermitian=True)
+        return float(math.sqrt(scaled[0, 0]) / unit[0])
+
+    def cells(self, row: Row) -> list[str]:
+        """Return the cells of a row."""
+        after = bool(row.late or row.damp or max(*row.warmed, *row.stepped) > 0.0)
+        effects = [self.effect(row, seed) for seed in range(KNOWN_SKINS)]
+        found = [
+            sorted(self.deviation(one, place, ohms, after) for one in effects)[KNOWN_SKINS // 2]
+            for place, ohms in ((PLACE_ERROR, MAKERS_OHMS), (PLACE_ERROR, KNOWN_OHMS), (MARK_ERROR, KNOWN_OHMS))
+        ]
+        by = ("by touches", "with the sheets' ohms", "with marks too", "not at all")
+        return [row.name, *(f"{one:.2g}" for one in found), by[next((k for k in range(3) if found[k] < SHOWN), 3)]]
 
 
 def _places(sensor: Sensor, rng: random.Random, speed: float) -> np.ndarray:
@@ -222,3 +335,7 @@ def main() -> None:
     rows = [measure(row, args.skins) for row in ROWS if row.name.startswith(args.rows)]
     columns = ["effect", "certain places off, median/95 % [mm]", "in ellipse", "certain", "named, share of touches"]
     show(f"skins as they are built, {NAME}, {ELECTRIC}", columns, rows)
+    knowledge, still = Knowledge(), ("ideal", "20 mV", "film, all", "coated, all")
+    known = [knowledge.cells(row) for row in ROWS if row.name.startswith(args.rows) and not row.name.startswith(still)]
+    columns = ["effect", "place unknown", "and ohms known", "and places known to 0.3 mm", "it can be known"]
+    show("Cramer-Rao deviation of an effect from nine touches, over its size", columns, known)
