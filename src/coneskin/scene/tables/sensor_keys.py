@@ -136,7 +136,7 @@ CALIBRATION_KEYS = with_meanings(
     map_around: what a calibration takes off places about the axis; `calibration` gives it
     map_error_mm: standard deviation of a calibrated place, along and around; `calibration` gives it
     map_note: where `map_along` and `map_around` come from
-    map_sheet_ohm: resistance of the upper and lower sheet per square at the calibration; `calibration` gives it
+    map_sheet_ohm: the sheets' ohm per square, as `calibration` gives it
     forces_n: known forces of a calibration, rising; `calibration` gives them
     force_levels: levels that the known forces gave
     force_error: standard deviation of a force that is read, as a share of it
