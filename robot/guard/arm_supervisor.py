@@ -53,8 +53,7 @@ class ArmSupervisor:
         planner: of motions away from a touch. None where no reaction moves the arm.
         heartbeat: supervision of the program that moves the arm. None where that is the driver process.
         speed_limit: of the skins' surfaces. None where nothing limits them.
-        held_braking: returns the deceleration that the motors hold at joint positions and speeds [rad/s2]. None where
-            what the arm weighs is not known: then it is taken to brake as commanded.
+        held_braking: as of `ArmStop`.
 
     Attributes:
         model, driver, heartbeat: as given.
@@ -95,12 +94,11 @@ class ArmSupervisor:
         if planner is None and self._rules.move:
             raise RobotRefused("a reaction that moves the arm away needs a planner")
         self._limits = limits
-        self._held_braking = held_braking
         self._planner = planner
         self._motion: MotionStream | None = None  # that is under way
         self._at_touch: ArmState | None = None  # in which the cause of the newest stop was seen
         self.state_age = StateAge(limits.arm_silence)
-        self._stop = ArmStop(limits, paths)
+        self._stop = ArmStop(limits, paths, held_braking)
         self._reaction = rules.default  # the one that is under way
         self._sent = False  # the stop for a touch whose event comes next
 
@@ -324,17 +322,12 @@ class ArmSupervisor:
         motion, state, self._motion = self._motion, self.state, None
         if motion is not None:
             motion.end(out)
-        speed = None if state is None or self.state_age.silent(now) else state.speed
-        self._stop.begin(now, speed, self._held(state))
+        self._stop.begin(now, None if self.state_age.silent(now) else state)
         return motion
-
-    def _held(self, state: ControllerState | None) -> float:
-        """Return the deceleration that the motors hold, as far as that is known [rad/s2]; it takes a millisecond."""
-        return math.inf if state is None or self._held_braking is None else self._held_braking(state.q, state.qd)
 
     def _as_held(self, reaction: Reaction) -> Reaction:
         """Return a reaction whose stop is no harder than the motors hold now."""
-        return replace(reaction, deceleration=min(reaction.deceleration, self._held(self.state)))
+        return replace(reaction, deceleration=min(reaction.deceleration, self._stop.held(self.state)))
 
     def _stands(self, state: ControllerState, measured_at: float, out: Outputs) -> bool:
         """Take a fresh state of a stop under way, report what it shows, and tell whether the arm stands."""

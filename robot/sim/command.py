@@ -10,6 +10,7 @@ import signal
 import socket
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,12 +36,32 @@ ur_rtde uses fixed ports, so each further arm on one machine needs an address of
 Ctrl-C stops the controller. Exit code: 0 stopped; 1 it cannot listen there, or an option is not possible."""
 
 
+#: option, type of its value, default, name of the value, help
+_VALUE_OPTIONS = (
+    ("--start-delay-ms", float, 10.0, "T", "time from a program's last byte to its first cycle [ms] (%(default)g)"),
+    ("--unlock-after-s", float, 5.0, "T", "time after which a protective stop can be unlocked [s] (%(default)g)"),
+    ("--program", Path, None, "FILE", "URScript program that the dashboard command play starts"),
+    ("--programs", Path, None, "FOLDER", "programs and installations that the dashboard can load"),
+    (
+        "--external-control",
+        str,
+        "127.0.0.1:50002",
+        "HOST:PORT",
+        "where a loaded program's node External Control gets its script (%(default)s)",
+    ),
+    ("--measured", Path, None, "FILE", "behave as the controller that scripts/measure_controller.py has seen"),
+    ("--log", Path, None, "FILE", "write a JSON line for each command and event"),
+)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``coneskin sim-ur``."""
     parser.formatter_class = HelpFormatter
     parser.description = "Simulate a UR controller. The unmodified ur_rtde package connects to it and moves its arm."
     parser.epilog = EXAMPLE
     add = parser.add_argument
+    for name, kind, default, metavar, text in _VALUE_OPTIONS:
+        add(name, type=kind, default=default, metavar=metavar, help=text)
     add("--host", default="127.0.0.1", help="address to listen on; others can reach all but 127.* (%(default)s)")
     add("--model", default=DEFAULT_MODEL, help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
     add("--version", default="5.25", metavar="MAJOR.MINOR", help="PolyScope version to report (%(default)s)")
@@ -53,32 +74,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="joint positions at the start [deg] (0 -90 90 -90 -90 0)",
     )
     add(
-        "--start-delay-ms",
-        type=float,
-        default=10.0,
-        metavar="T",
-        help="time from a program's last byte to its first cycle [ms] (%(default)g)",
-    )
-    add(
-        "--unlock-after-s",
-        type=float,
-        default=5.0,
-        metavar="T",
-        help="time after which a protective stop can be unlocked [s] (%(default)g)",
-    )
-    add(
         "--protective-stop",
         choices=("pause", "stop"),
         default="pause",
         help="effect of a protective stop on the running program (%(default)s)",
-    )
-    add("--program", type=Path, metavar="FILE", help="URScript program that the dashboard command play starts")
-    add("--programs", type=Path, metavar="FOLDER", help="programs and installations that the dashboard can load")
-    add(
-        "--external-control",
-        default="127.0.0.1:50002",
-        metavar="HOST:PORT",
-        help="where a loaded program with the node External Control asks for its script (%(default)s)",
     )
     add(
         "--control",
@@ -96,15 +95,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SERVICE",
         help=f"services that are switched off: {', '.join(services)}",
     )
-    add(
-        "--measured",
-        type=Path,
-        metavar="FILE",
-        help="behave as the controller that scripts/measure_controller.py has seen",
-    )
     add("--fieldbus", action="store_true", help="a fieldbus adapter holds the lower half of the input registers")
     add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
-    add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add(
         "--faults", action="store_true", help="open a port, to this computer alone, that takes faults (--json names it)"
     )
@@ -155,23 +147,19 @@ def _serve(args: argparse.Namespace) -> int:
             deceleration=measured.deceleration or options.deceleration,
         )
     parent = os.getppid()
-    log = None
-    try:
-        if args.log:
-            log = args.log.open("w", buffering=1)
-    except OSError as exc:
-        raise RobotRefused(f"--log {args.log} cannot be written: {exc.strerror}") from exc
-    try:
+    with ExitStack() as stack:
+        try:
+            log = stack.enter_context(args.log.open("w", buffering=1)) if args.log else None
+        except OSError as exc:
+            raise RobotRefused(f"--log {args.log} cannot be written: {exc.strerror}") from exc
         plant = None if args.plant_descriptor is None else _plant(args.plant_descriptor, options)
         controller = Controller(options, log, plant)
-        with Server(controller, args.host, faults=args.faults) as server, bounded_memory(SIMULATOR_MEMORY):
-            for number in (signal.SIGTERM, signal.SIGINT):
-                signal.signal(number, lambda *_: server.stop())
-            _announce(args, controller, server)
-            server.run(alive=lambda: not args.exit_with_parent or os.getppid() == parent)
-    finally:
-        if log is not None:
-            log.close()
+        server = stack.enter_context(Server(controller, args.host, faults=args.faults))
+        stack.enter_context(bounded_memory(SIMULATOR_MEMORY))
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: server.stop())
+        _announce(args, controller, server)
+        server.run(alive=lambda: not args.exit_with_parent or os.getppid() == parent)
     return 0
 
 

@@ -6,7 +6,9 @@ The guard stops its arm by this, and so does a guard watchdog, beside its own co
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
+from coneskin.robot.arm.model import Joints
 from coneskin.robot.driver.messages import EndReaction, StopProgram
 from coneskin.robot.driver.protocol import StopSink
 from coneskin.robot.driver.values import ControllerState, StopPath, UseStopPath
@@ -24,13 +26,21 @@ class ArmStop:
     Args:
         limits: of the monitoring.
         paths: the stop paths that there are, in the order of their use.
+        held_braking: returns the deceleration that the motors hold at joint positions and speeds [rad/s2]. None where
+            what the arm weighs is not known: then it is taken to brake as commanded.
 
     Attributes:
         paths: those that are left.
         watch: of the arm that stands.
     """
 
-    def __init__(self, limits: MonitoringLimits, paths: tuple[StopPath, ...]) -> None:
+    def __init__(
+        self,
+        limits: MonitoringLimits,
+        paths: tuple[StopPath, ...],
+        held_braking: Callable[[Joints, Joints], float] | None = None,
+    ) -> None:
+        self._held_braking = held_braking
         self.paths = paths
         self.watch = StandstillWatch(limits.standstill)
         self._limits = limits
@@ -59,18 +69,17 @@ class ArmStop:
         """True where the newest stop, whose arm stands, took no other path than the first."""
         return self._monitor is not None and self._monitor.used == [self._first]
 
-    def begin(self, now: float, speed: float | None, held: float = math.inf) -> None:
-        """Begin to monitor the stop that was sent.
+    def held(self, state: ControllerState | None) -> float:
+        """Return the deceleration that the motors hold, as far as that is known [rad/s2]; it takes a millisecond."""
+        return math.inf if state is None or self._held_braking is None else self._held_braking(state.q, state.qd)
 
-        Args:
-            now: host time [s].
-            speed: largest joint speed, if known [rad/s].
-            held: deceleration that the arm's motors hold at most; infinite where that is not known [rad/s2].
-        """
+    def begin(self, now: float, state: ControllerState | None) -> None:
+        """Begin to monitor the stop that was sent, at a host time [s] and in a state; None where that is not known."""
         order, deceleration = self._sent
         if order[:1] == (StopPath.PROTECTIVE,):
             self._protective_at = now
-        budget = self._limits.stop_budget(speed or 0.0, min(deceleration, held))
+        speed = None if state is None else state.speed
+        budget = self._limits.stop_budget(speed or 0.0, min(deceleration, self.held(state)))
         self._monitor = StopMonitor(now, speed, order, self._limits, budget)
         self.watch.end()
 

@@ -49,7 +49,7 @@ class StandstillHold:
         limits: of the monitoring.
         deceleration: of its stops, where the guard asks for no other [rad/s2].
         reader: of the controller's state, open; None where there is none yet.
-        held_braking: as of `ArmSupervisor`.
+        held_braking: as of `ArmStop`.
         clock: monotonic seconds.
 
     Attributes:
@@ -72,10 +72,9 @@ class StandstillHold:
         self._connections = connections
         self._limits = limits
         self._deceleration = deceleration
-        self._held_braking = held_braking
         self._clock = clock
         own = frozenset[StopPath]().union(*driver.lost_with.values())
-        self._stop = ArmStop(limits, tuple(path for path in _STOP_PATHS if path in own))
+        self._stop = ArmStop(limits, tuple(path for path in _STOP_PATHS if path in own), held_braking)
         self._state: ControllerState | None = None  # the newest
         self._age = StateAge(limits.arm_silence)
         self._opened = -math.inf if reader is None else clock()  # when the reader was last opened, or tried
@@ -93,11 +92,7 @@ class StandstillHold:
             self._deceleration = deceleration
         self._stop.send(StopProgram(self._deceleration), self)
         self._began = self._due = now = self._clock()
-        state, held = None if self.states_missing() else self._state, self._held_braking
-        if state is None or held is None:
-            self._stop.begin(now, None if state is None else state.speed)
-        else:
-            self._stop.begin(now, state.speed, held(state.q, state.qd))
+        self._stop.begin(now, None if self.states_missing() else self._state)
         self._phase = _HoldPhase.STOPPING_AGAIN if self.failed else _HoldPhase.STOPPING
 
     @property

@@ -91,7 +91,7 @@ class ReactionPlanner:
         watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
         table: height in the base frame that the arm must not go below while it moves [m].
         bare: sides of the arm that no skin covers. None where there are none.
-        held_braking: as of `ArmSupervisor`.
+        held_braking: as of `ArmStop`.
 
     Attributes:
         torque: from outside on the joints.

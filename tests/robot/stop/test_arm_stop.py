@@ -32,7 +32,7 @@ def test_a_stop_has_the_time_that_the_motors_take(held):
     rig = GuardRig(touch(0.5, 0.9), reaction=Reaction(kind="stop"), external=True, speed=2.0)
     go = rig.arm.go
     rig.arm.go = lambda target, acceleration: go(target, min(acceleration, 2.5))
-    rig.core._arm._held_braking = lambda q, qd: held if any(qd) else math.inf
+    rig.core._arm._stop._held_braking = lambda q, qd: held if any(qd) else math.inf
     rig.run(2.5)
     assert rig.core.phase.stands
     first, *others = rig.arm.commands

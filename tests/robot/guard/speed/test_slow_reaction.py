@@ -63,7 +63,7 @@ def test_an_arm_that_does_not_become_slower_is_stopped():
 def test_an_arm_whose_motors_brake_softer_has_the_time_that_these_take():
     rig = GuardRig(touch(0.5, 0.9), reaction=SLOW, speed=1.0)
     rig.arm.heeds = False
-    rig.core._arm._held_braking = lambda q, qd: 4.0 if any(qd) else math.inf
+    rig.core._arm._stop._held_braking = lambda q, qd: 4.0 if any(qd) else math.inf
     rig.run(1.5)
     # 1 rad/s at 4 rad/s2, and four times 25 ms
     assert rig.event("stopping").time - rig.event("speed_reduced").time == pytest.approx(0.351, abs=0.002)
