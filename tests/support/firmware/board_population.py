@@ -100,8 +100,9 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
     highest = three - 1e-3 * limits["amplifier"]["swing_mv"][1]
     supply = parts.supply_volts * (1.0 + 0.01 * _drawn(rng, limits["regulator"]["error_percent"]))
     bias = parts.current_zero / 3.3 * SENSE_GAIN * circuit.shunt_ohms * three
-    mux = limits["multiplexer"]["leak_na"][1] if circuit.board.common else 0.0
-    leak = 1e-9 * 10 ** rng.uniform(-1.5, 0.0, 4) * (limits["clamp"]["leak_na"][1] + 2.0 * switch["leak_na"][1] + mux)
+    own = limits[circuit.converter.name if circuit.converter else circuit.board.name].get("leak_na", [0.0, 0.0])[1]
+    own += limits["multiplexer"]["leak_na"][1] if circuit.board.common else 0.0
+    leak = 1e-9 * 10 ** rng.uniform(-1.5, 0.0, 4) * (limits["clamp"]["leak_na"][1] + 2.0 * switch["leak_na"][1] + own)
     signs = rng.choice((-1.0, 1.0), 4)
     drift = rng.uniform(-1, 1) * limits["regulator"]["drift_ppm_per_k"][1] * 1e-6
     values = {"cable": length, "offset_uv": 1e6 * amplifier, "switch": float(on.mean()), "leak_na": 1e9 * leak.max()}
@@ -144,8 +145,12 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
     return volts, values, three
 
 
-def curve_of(circuit: BoardCircuit, rng: np.random.Generator, three: float) -> Curve:
-    """Draw the converter of a board: offset, gain and bend within its data sheet; its reference is 3.3 V or its own."""
+def curve_of(circuit: BoardCircuit, rng: np.random.Generator, three: float) -> tuple[Curve, float]:
+    """Draw the converter of a board: offset, gain and bend within its data sheet; its reference is 3.3 V or its own.
+
+    Returns:
+        the curve, and how far it bends [V].
+    """
     parts, other = circuit.sensor.electronics, circuit.converter
     limits = part_catalog()[other.name if other else circuit.board.name]["limits"]
     bits = other.bits if other else circuit.board.bits
@@ -158,7 +163,7 @@ def curve_of(circuit: BoardCircuit, rng: np.random.Generator, three: float) -> C
     def read(volts: Array) -> Array:
         return volts * scale + offset + bend * np.sin(where + 2.0 * math.pi * turns * volts / parts.adc_volts)
 
-    return read
+    return read, bend
 
 
 def esp32_curve(rng: np.random.Generator) -> Curve:
@@ -206,10 +211,11 @@ def judge(
     circuit = _circuit(name, converter)
     sensor = circuit.sensor
     volts, values, three = volts_seen(circuit, rng, offset)
-    read = esp32_curve(rng) if esp32 else curve_of(circuit, rng, three)
+    read, bend = (esp32_curve(rng), 0.0) if esp32 else curve_of(circuit, rng, three)
     sheets = sheets_of(FOREARM, SHEETS[int(rng.integers(3))])
     mains, noise = rng.uniform(0.0, 5e-3), rng.uniform(0.5, 1.5)
     warming, per_kelvin = rng.uniform(10.0, 40.0), rng.uniform(-2e-4, 2e-4)
+    values |= {"curve_mv": 1e3 * bend, "mains_mv": 1e3 * mains, "warming_k": warming}
     faults: list[str] = []
     errors: list[float] = []
 
