@@ -4,6 +4,7 @@ import itertools
 import json
 import math
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -85,13 +86,14 @@ def test_one_scene_takes_the_sensors_of_all_links(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    robot = write_robot(tmp_path, 0.42)
+    robot = write_robot(tmp_path, 0.42).rename(tmp_path / "ur10e.urdf")
     assert main(["design", f"{robot}#forearm_link", "--wires", "8", "-o", "skin"]) == 1
     assert "--wires is for a whole robot" in capsys.readouterr().err
     assert main(["design", str(robot), "--wires", "8", "--max-sheets", "1", "-o", "skin"]) == 0
     said = capsys.readouterr().out
     assert "4 wires" in said
     assert "8 wires" in said
+    assert "next: coneskin init skin --simulated --arm UR10e" in said, "by the name of the file, or a word for xacro"
     assert (tmp_path / "skin" / "curve.png").is_file()
     assert main(["init", "skin", "--simulated", "--arm", "UR5e"]) == 0
     assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
@@ -103,3 +105,5 @@ def test_one_scene_takes_the_sensors_of_all_links(
     for count, rate in ((3, 200), (6, 100), (9, 100)):
         assert f"rate_hz = {rate} " in _virtual(read_designs(tmp_path / "skin")[0], count)
     assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0
+    alone = tomllib.loads((tmp_path / "alone.toml").read_text())
+    assert [link["name"] for link in alone["link"]] == ["upper_arm_link", "forearm_link"], "as the URDF names them"

@@ -38,6 +38,7 @@ from coneskin.design.sheets.summary import small_active_area
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.robot.arm.kinematics import LINK_INDEX
+from coneskin.robot.arm.models import MODEL_NAMES
 from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from coneskin.scene.tables.sensor_keys import DOUBLE_CONE_KEYS
 from coneskin.skin.electronics import shunt_ohms
@@ -160,8 +161,10 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
         area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"
         print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{included}")
     print("\n".join(design.reasons))
+    said = {Path(args.link).name.partition(".")[0].lower(), *(word.lower() for word in common["arguments"].values())}
+    model = next((name for name in MODEL_NAMES if name.lower() in said), DEFAULT_MODEL)
     folder = shlex.quote(str(args.output))
-    print_hint(f"next: coneskin init {folder} --simulated --arm {DEFAULT_MODEL}; on another arm than a UR: --skin-only")
+    print_hint(f"next: coneskin init {folder} --simulated --arm {model}; on another arm than a UR: --skin-only")
     return 0
 
 

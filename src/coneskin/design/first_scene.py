@@ -166,7 +166,8 @@ def first_scene(
         GeometryError: the link, or the place of the sensors on it, is not known.
         KinematicsError: there is no such arm or link.
     """
-    names = [link or design.link for design in designs]
+    named = arm is not None or len(designs) == 1  # links of a robot without an arm in the scene keep their own names
+    names = [link or (design.link if named else None) for design in designs]
     if arm is not None and None in names:
         raise GeometryError(
             f"which link of the arm was it designed for? Add --link, one of {', '.join(LINK_INDEX)}, or --skin-only "
