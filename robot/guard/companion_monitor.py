@@ -70,6 +70,7 @@ class CompanionMonitor:
         self._held_up: dict[str, tuple[float, str]] = {}  # process -> when it was last seen waiting [s], and for what
         self._suspended = False  # the program, by the newest look
         self._silent: dict[str, str] = {}  # process -> what is wrong with it now
+        self._heard_until = -math.inf  # before it none can be silent [s]
         self._program = _DriverProgram()
 
     @property
@@ -164,6 +165,8 @@ class CompanionMonitor:
 
         The time is that on the ``_StallClock`` [s].
         """
+        if now < self._heard_until:
+            return []
         before, self._silent = self._silent, self._look(now)
         if not self._silent:
             return []
@@ -176,12 +179,13 @@ class CompanionMonitor:
 
     def _look(self, now: float) -> dict[str, str]:
         """Return what is wrong with each process that is silent. Empty where all are heard."""
-        found = {}
+        found, heard_until = {}, math.inf
         for process, limit in self._limits.items():
             heard = self._heard.get(process)
             if heard is None:
                 found[process] = f"{process}: no sign of life yet"
                 continue
+            heard_until = min(heard_until, heard + limit - BEAT_PERIOD)
             if process == _USER_PROGRAM and not self._suspended:
                 continue
             since, what = self._held_up.get(process, (-math.inf, ""))
@@ -190,4 +194,5 @@ class CompanionMonitor:
             if now - heard > allowed:
                 said = what if waits else _SILENT_WORDS[process == _USER_PROGRAM]
                 found[process] = f"{process}: {said.format(1e3 * allowed)}"
+        self._heard_until = -math.inf if found else heard_until
         return found

@@ -1,7 +1,8 @@
 """Live loop of the guard: one thread in a process of its own that joins source, core and arm.
 
 Order of work after each wake: read the skin, decide, send the command. Only then it reports to the recorder. Whatever
-may stall (disk, terminal, driver) is on the other side of a channel that never makes it wait.
+may stall (disk, terminal, driver) is on the other side of a channel that never makes it wait. The skin alone wakes the
+loop: all else waits for its next look, at most 2 ms, because each wake costs more than what is done in it.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import gc
 import json
 import select
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -123,7 +124,8 @@ _PORT_ATTRIBUTES = {"skin": "source", "controller": "reader"}
 _LATE_TIME = 2.0 * BEAT_PERIOD  # s without a heartbeat, from which on it is asked why
 _QUESTION_PERIOD = 0.25  # s between two questions whether the controller takes stops
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
-_REPORT_PERIOD = 0.005  # s between two reports to the session where nothing was decided
+_LOOK_PERIOD = 0.0015  # s between two looks at what is no skin, where frames come: every second one of 1 kHz
+_REPORT_PERIOD = 0.01  # s between two reports to the session where nothing was decided
 _OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
 _SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
 _FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
@@ -141,9 +143,12 @@ _SESSION: Final = 128
 _SECOND: Final = 256
 
 
+#: of monotonic seconds that count the computer's sleep as well, where the system has such a clock
+_BOOT_CLOCK: Final = getattr(time, "CLOCK_BOOTTIME", None)
+
+
 def _boot_time() -> float:
-    """Return monotonic seconds that count the computer's sleep as well, where the system has such a clock."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
+    return time.monotonic() if _BOOT_CLOCK is None else time.clock_gettime(_BOOT_CLOCK)
 
 
 class GuardLoop:
@@ -173,6 +178,8 @@ class GuardLoop:
         self._watched: dict[int, HasFileno] = {}
         self._bits: dict[int, int] = {}  # of these descriptors
         self._epoll: Any = select.epoll() if hasattr(select, "epoll") else None
+        self._skin_epoll: Any = select.epoll() if hasattr(select, "epoll") else None
+        self._look_at = 0.0  # when is looked at what is no skin
         self._quit = False
         self._fed = False  # anything, in this step
         self._beat = -BEAT_PERIOD
@@ -226,44 +233,67 @@ class GuardLoop:
             number = item.fileno()
             self._watched[number], self._bits[number] = item, bit
             if self._epoll is not None:
-                self._epoll.register(number, select.EPOLLIN)
+                (self._skin_epoll if bit == _SKIN else self._epoll).register(number, select.EPOLLIN)
 
     def _forget(self, item: object) -> None:
         for number in [number for number, watched in self._watched.items() if watched is item]:
             del self._watched[number], self._bits[number]
-            if self._epoll is not None:
-                with suppress(OSError):  # it is closed
-                    self._epoll.unregister(number)
+            for epoll in filter(None, (self._skin_epoll, self._epoll)):
+                with suppress(OSError):  # it is closed, or in the other one
+                    epoll.unregister(number)
 
     def _wait(self, timeout: float) -> int:
-        """Wait for input, or for the timeout [s], and return the bits of what can be read."""
-        ready, bits = 0, self._bits
-        if self._epoll is None:
-            for item in wait_readable(list(self._watched.values()), timeout):
-                ready |= bits[item.fileno()]
-        else:
-            for number, _ in self._epoll.poll(timeout, _MAX_READY):
-                ready |= bits[number]
+        """Wait for the skin, or without epoll for anything, or for the timeout [s]; return the bits of what came."""
+        if self._epoll is not None:
+            return _SKIN if self._skin_epoll.poll(0.0 if self._blind else timeout, 1) else 0
+        return self._bits_of(item.fileno() for item in wait_readable(list(self._watched.values()), timeout))
+
+    def _bits_of(self, numbers: Iterable[int]) -> int:
+        ready = 0
+        for number in numbers:
+            ready |= self._bits[number]
         return ready
 
     def _close(self) -> None:
         if self._reopening is not None:
             self._reopening.stop()
-        if self._epoll is not None:
-            self._epoll.close()
+        for epoll in filter(None, (self._skin_epoll, self._epoll)):
+            epoll.close()
 
     def poll(self, timeout: float) -> None:
-        """Wait for input, or for the timeout [s], and serve it."""
+        """Wait for the skin, or for the timeout [s], and serve what has come."""
         ready = self._wait(timeout)
         ports, (before, sleepless_before) = self._ports, self._round
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
         if now - before > _OVERRUN_TIME or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)
+        if self._epoll is not None and (not ready or now >= self._look_at):
+            self._look_at = now + _LOOK_PERIOD
+            ready |= self._bits_of(number for number, _ in self._epoll.poll(0, _MAX_READY))
         if ready & _READER and self._core.phase.stopping:  # states that wait may show that the stop under way works
             self._read(ports.reader, "controller", BlockKind.ARM)
             ready &= ~_READER
         if ports.source is not None and (ready & _SKIN or self._blind):
             self._read_skin(ports.source)
+        if ready & ~_SKIN:
+            self._read_others(ready)
+        if self._gone is not None and self._core.phase is Phase.LATCHED:
+            self._open_skin_again(self._gone)
+        if ports.heartbeat is not None and (count := heartbeat_count(now)) != self._count:
+            self._count = count
+            ports.heartbeat.write(count)
+        if now - self._beat >= BEAT_PERIOD:
+            self._send_heartbeat(now)
+            self._look_at_processes()
+        if not self._fed:
+            self._feed(BlockKind.TICK, b"")
+        self._fed = False
+        if now >= self._report_at:
+            self._report()
+
+    def _read_others(self, ready: int) -> None:
+        """Serve what is ready and no skin."""
+        ports = self._ports
         # read before what announces the ends of a program that they show, and fed after it
         states = self._payloads(ports.reader, "controller") if ready & _READER else []
         if states or ready & _DRIVER:
@@ -282,19 +312,6 @@ class GuardLoop:
             self._drain(ports.stops)
         if ready & _SESSION:
             self._read_session(ports.session)
-        if self._gone is not None and self._core.phase is Phase.LATCHED:
-            self._open_skin_again(self._gone)
-        if ports.heartbeat is not None and (count := heartbeat_count(now)) != self._count:
-            self._count = count
-            ports.heartbeat.write(count)
-        if now - self._beat >= BEAT_PERIOD:
-            self._send_heartbeat(now)
-            self._look_at_processes()
-        if not self._fed:
-            self._feed(BlockKind.TICK, b"")
-        self._fed = False
-        if now >= self._report_at:
-            self._report()
 
     def _note_overrun(self, now: float, late: float, asleep: float) -> None:
         """Report how late this round is, to the core as well where nobody has guarded meanwhile."""
@@ -418,8 +435,8 @@ class GuardLoop:
 
     def _lose(self, what: str, why: str, item: object) -> None:
         self._forget(item)
-        if what == "skin" and self._ports.reopen is not None:
-            self._gone = self._ports.source
+        if what == "skin":
+            self._blind, self._gone = False, self._ports.source if self._ports.reopen is not None else None
         setattr(self._ports, _PORT_ATTRIBUTES.get(what, what), None)
         self._feed(BlockKind.LOST, encode_loss(what, why))
         if what == "controller" and (driver := self._ports.driver) is not None:

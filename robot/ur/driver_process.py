@@ -135,7 +135,6 @@ def _duration(request: dict[str, Any]) -> float:
 _MOTION_COMMANDS = (StopProgram, EndReaction, SetJointVelocity)
 _START_TIMEOUT = 3.0  # s for the controller to start the control program again
 _MOVE_POLL_PERIOD = 0.005  # s between two looks at a move whose end the program waits for
-_KICK_PERIOD = 0.02  # s; well within the watchdog's period, and no load for the controller
 
 
 class DriverProcess:
@@ -193,7 +192,7 @@ class DriverProcess:
         """Return how long nothing but a message needs this process [s]."""
         if self._waiting:
             return _MOVE_POLL_PERIOD
-        due = min(self._kicked + _KICK_PERIOD, self._expires, self._heard + self._patience)
+        due = min(self._kicked + self._arm.kick_period, self._expires, self._heard + self._patience)
         return max(due - self._clock(), 0.0)
 
     def poll(self, timeout: float) -> bool:
@@ -232,7 +231,7 @@ class DriverProcess:
             self._serve_guard(command)
 
     def _kick(self, now: float) -> None:
-        if now - self._kicked >= _KICK_PERIOD:
+        if now - self._kicked >= 0.5 * self._arm.kick_period:  # or sooner than it must, awake for something else
             self._arm.kick()
             self._kicked = now
 

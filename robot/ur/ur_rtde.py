@@ -50,6 +50,8 @@ STRAIGHT_MOVES = ("move_l", "move_l_fk")  #: kinds of a move on which the tool g
 MIN_ACCELERATION = 0.1  #: rad/s2 or m/s2
 _STOP_MARGIN = 0.3  # s for a stop to begin and to be confirmed
 _MAX_JOINT_SPEED = 3.5  # rad/s, of any joint; a stop takes this divided by the deceleration at most
+_MIN_KICK_PERIOD = 0.02  # s; no load for the controller
+_MAX_KICK_PERIOD = 0.04  # s; longer than from one heartbeat of the guard to the next, which wakes the driver as well
 _NO_TOOL = [0.0, 0.0, 1e-12, 0.0, 0.0, 0.0]  # m and rad; the wheel sends a packet of a wrong size for exact zeros
 _MAX_STOP_TIME = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
 
@@ -111,6 +113,7 @@ class UrArm:
         mode: what it does.
         control: the wheel's RTDEControlInterface; None outside the ``with``.
         wheel: its module.
+        kick_period: after which the controller's watchdog is to be kicked at the latest [s].
 
     Raises:
         MissingExtra: the wheel is not installed.
@@ -123,6 +126,7 @@ class UrArm:
         self.control: Any = None
         self.wheel: Any = None
         self._watchdog_hz = watchdog_hz
+        self.kick_period = min(max(0.2 / watchdog_hz, _MIN_KICK_PERIOD), _MAX_KICK_PERIOD)
 
     def __enter__(self) -> UrArm:
         try:

@@ -157,7 +157,7 @@ class Detector:
         if self.touched or whole >= self._release or level >= self._release:
             reading = read(self.sensor, frame, self._inversion, judged=judged)
             fault = reading.fault
-        if fault is Fault.LEAK and resting and not zero.known:
+        if resting and not zero.known and fault is Fault.LEAK:
             self.timing.seen_valid(now)
             return events  # the first frames tell what no current reads
         if zero.excess and ((fault is None and resting) or fault is Fault.LEAK):

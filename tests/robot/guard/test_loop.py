@@ -1,5 +1,6 @@
 """The loop's clock: whatever else talks, the core hears that time passes."""
 
+import select
 import socket
 from types import SimpleNamespace
 from unittest.mock import Mock, call
@@ -7,6 +8,7 @@ from unittest.mock import Mock, call
 import pytest
 
 from coneskin.core.channel import Channel, pair
+from coneskin.core.errors import SkinConnectionError
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts, _Outbox
@@ -105,6 +107,47 @@ def test_a_skin_is_waited_for_only_where_no_descriptor_tells_that_it_has_bytes(e
     asked = []
     GuardLoop(core, GuardPorts(ends[0], skin))._read_skin(skin)
     assert (asked, core.taken) == ([timeout], [BlockKind.SKIN])
+
+
+@pytest.mark.pure  # its core is a stub
+@pytest.mark.skipif(not hasattr(select, "epoll"), reason="without epoll everything wakes the loop")
+def test_the_skin_alone_wakes_the_loop_and_all_else_waits_for_its_next_look(ends):
+    core, now, (near, far) = Core(), [10.0], socket.socketpair()
+    skin = SimpleNamespace(fileno=near.fileno, read=lambda _: near.recv(64))
+    loop = GuardLoop(core, GuardPorts(ends[0], skin), lambda: now[0], lambda: now[0])
+    loop._open()
+    for later, frame, taken in (
+        (0.0, b"", [BlockKind.TICK]),
+        (0.001, b"frame", [BlockKind.SKIN]),
+        (0.001, b"frame", [BlockKind.SKIN, BlockKind.RESET]),
+        (0.0001, b"frame", [BlockKind.SKIN]),
+        (0.0001, b"", [BlockKind.RESET]),  # nothing came in the whole of the wait
+    ):
+        now[0] += later
+        if frame:
+            far.send(frame)
+            ends[1].send(b"reset 1 1")
+        core.taken.clear()
+        loop.poll(0.0)
+        assert sorted(set(core.taken)) == sorted(taken)
+    loop._close()
+    near.close()
+    far.close()
+
+
+@pytest.mark.pure  # its core is a stub
+def test_a_skin_without_a_descriptor_is_waited_for_once_and_no_more_when_it_is_gone(ends):
+    def read(_):
+        raise SkinConnectionError("it is gone")
+
+    core, skin = Core(), SimpleNamespace(fileno=lambda: None, read=read)
+    loop = GuardLoop(core, GuardPorts(ends[0], skin))
+    loop._epoll = loop._skin_epoll = Mock(**{"poll.return_value": []})
+    loop._wait(0.002)
+    loop._read_skin(skin)
+    loop._wait(0.002)
+    assert core.taken == [BlockKind.LOST]
+    assert [each.args[0] for each in loop._skin_epoll.poll.mock_calls] == [0.0, 0.002]
 
 
 def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
