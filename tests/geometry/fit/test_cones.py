@@ -262,7 +262,7 @@ def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
 
 @pytest.mark.long
 def test_the_slow_rays_give_the_same_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
-    body = placed(frustum(0.05, 0.04, 0.3, segments=64))
+    body = placed(frustum(0.05, 0.04, 0.3, segments=32))
     fast = find_cones(body)
     monkeypatch.setitem(body.__dict__, "embree_intersector", None)
     slow = find_cones(body)
@@ -318,9 +318,8 @@ def test_two_partial_wraps_share_a_tube() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("body", [barrel, shoulder], ids=lambda body: body.__name__)
-def test_a_looser_tolerance_is_never_worse(body) -> None:  # type: ignore[no-untyped-def]
-    mesh = placed(noisy(body(), 1e-4))
+def test_a_looser_tolerance_is_never_worse() -> None:
+    mesh = placed(noisy(shoulder(), 1e-4))
     areas = [
         sum(sheet.frustum.area for sheet in cones(mesh, tolerance=tolerance).sheets)
         for tolerance in (5e-4, 1e-3, 1.4e-3, 3e-3)

@@ -10,25 +10,22 @@ import pytest
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.mesh import Mesh
 
-from ..synthetic import barrel, frustum, holed, placed, revolve, shoulder
+from ..synthetic import frustum, holed, placed, revolve, shoulder
 from .shared_fits import cones
 from .test_cones import link
 
 #: tubes and cones of one axis: one sheet fewer than there are straight sides is one too few
-ZIGZAG = [(0.0, 0.03), (0.1, 0.05), (0.2, 0.03), (0.3, 0.05)]
+DOUBLE_CONE = [(0.0, 0.03), (0.1, 0.05), (0.2, 0.03)]
 STEPS = [(0.0, 0.05), (0.08, 0.05), (0.081, 0.04), (0.16, 0.04), (0.161, 0.03), (0.24, 0.03)]
 
 
 BODIES: dict[str, Callable[[], Mesh]] = {
     "tube": lambda: placed(frustum(0.05, 0.05, 0.2)),
-    "double cone": lambda: placed(revolve(ZIGZAG[:3])),
-    "zigzag": lambda: placed(revolve(ZIGZAG)),
+    "double cone": lambda: placed(revolve(DOUBLE_CONE)),
     "steps": lambda: placed(revolve(STEPS)),
-    "barrel": lambda: placed(barrel()),
     "shoulder": lambda: placed(shoulder()),
     "holed": lambda: placed(holed()),
     "UR5e forearm": lambda: link("ur/ur5e/visual/forearm.dae"),
-    "UF850 link 4": lambda: link("xarm/uf850_link4.stl"),
 }
 
 
@@ -62,9 +59,8 @@ def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["barrel", "UF850 link 4"])
-def test_the_tolerance_that_is_advised_gives_a_sheet(name: str) -> None:
-    mesh = BODIES[name]()
+def test_the_tolerance_that_is_advised_gives_a_sheet() -> None:
+    mesh = link("xarm/uf850_link4.stl")
     tried = 0
     for tolerance in (2e-5, 1e-4, 3e-4):
         fit = cones(mesh, tolerance=tolerance)

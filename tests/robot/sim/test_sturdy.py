@@ -353,8 +353,8 @@ def test_malformed_packets_change_nothing_for_another_client(server: Server, rea
 @pytest.mark.long
 @pytest.mark.parametrize("service", SERVICES)
 def test_many_malformed_packets_change_nothing_for_another_client(server: Server, reader: Reader, service: str) -> None:
-    """Thirty thousand, in batches; what is left of a batch goes with a connection that is ended."""
-    flood(server, reader, service, 30_000, 17, batch=10_000)
+    """Ten thousand at once; what is left of them goes with a connection that is ended."""
+    flood(server, reader, service, 10_000, 17, batch=10_000)
     server.controller.stop_program("test")
     server.controller.unlock(early=True)
     with connect(server, "secondary") as client:
