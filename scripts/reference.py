@@ -18,6 +18,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,39 @@ GROUPS = {
 
 
 # scene keys
+
+
+def _scene_tables() -> dict[str, tuple[Any, ...]]:
+    """Return the keys of every table of a scene by its heading, in the order of the page, each with its default."""
+    from coneskin.robot.reaction.types import Reaction
+    from coneskin.robot.stop.limits import MonitoringLimits
+    from coneskin.scene.tables import keys
+    from coneskin.scene.tables.sensor_keys import FILE_KEYS, SENSOR_KEYS
+
+    return {
+        "[arm]": keys.ARM_KEYS,
+        "[[link]]": keys.LINK_KEYS,
+        "[[link.sensor]]": (*FILE_KEYS, *SENSOR_KEYS),
+        "[source]": keys.source_keys(),
+        "[[source.touch]]": keys.TOUCH_KEYS,
+        "[reaction]": _with_defaults(keys.REACTION_KEYS, Reaction),
+        "[[reaction.rule]]": keys.RULE_KEYS,
+        "[monitoring]": _with_defaults(keys.MONITORING_KEYS, MonitoringLimits),
+        "[recording]": keys.RECORDING_KEYS,
+        "[motion]": keys.MOTION_KEYS,
+        "[commissioning]": keys.COMMISSIONING_KEYS,
+        "[[body]]": keys.BODY_KEYS,
+        "[padding]": keys.PADDING_KEYS,
+        "[speed_limit]": keys.SPEED_LIMIT_KEYS,
+        "[[speed_limit.curve]]": keys.CURVE_KEYS,
+        "[[speed_limit.patch]]": keys.PATCH_KEYS,
+    }
+
+
+def _with_defaults(keys: Sequence[Any], settings: type) -> tuple[Any, ...]:
+    """Return keys with the defaults of the dataclass that takes their values."""
+    defaults = {field.name: field.default for field in fields(settings)}
+    return tuple(replace(key, default=defaults[key.plain]) if key.default is None else key for key in keys)
 
 
 def scene_table(keys: Sequence[Any]) -> str:
@@ -309,9 +343,7 @@ def page(name: str) -> str:
         after = rest.split(end, 1)[1]
         text = before + begin + make() + end + after
     if name == "scene.md":
-        from coneskin.scene.tables.keys import scene_tables
-
-        for section, keys in scene_tables().items():
+        for section, keys in _scene_tables().items():
             head = f"\n## `{section}`\n"
             assert head in text, f"docs/look-up/scene.md needs a section {section}"
             start = text.index("| key | unit |", text.index(head))

@@ -88,7 +88,7 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[S
     exit_phi = float(way.surface[0, 1]) - turned
     across = []
     for wire in wires:
-        name, colour = wire.electrode, WIRE_COLOURS[wire.electrode]
+        colour = WIRE_COLOURS[wire.electrode]
         style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
         beyond = wire.u + off[0] * tab, wire.phi + off[1] * tab / max(cone.radius_at(wire.u), 1e-3)
         target = (beyond[0], exit_phi) if ends else (float(way.surface[0, 0]), beyond[1])

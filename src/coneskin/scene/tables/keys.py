@@ -1,11 +1,6 @@
 """Every key that a scene may have: name, type, unit, range, default and meaning, in this file and ``sensor_keys``.
 
-The readers beside this file check with them, and the reference page of the scene file is made of them. To iterate over
-all of them::
-
-    for table, keys in scene_tables().items():        # "[arm]", "[[link.sensor]]", in the order of the page
-        for key in keys:
-            key.name, key.unit, key.bounds, key.default_words, key.meaning
+The readers beside this file check with them, and the reference page of the scene file is made of them.
 
 The plain names of the keys of [reaction] and [monitoring] are the fields of the class that takes them. It has their
 defaults too.
@@ -13,14 +8,11 @@ defaults too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from coneskin.core.keys import Key, with_meanings
 from coneskin.scene.values.scene import BODY_KINDS
 from coneskin.skin.sources.kinds import SOURCE_KINDS
-
-from .sensor_keys import FILE_KEYS, SENSOR_KEYS
 
 MAX_SIZE = 256_000  #: bytes of a scene file or a sensor file; a scene of 100 sensors has 50 kB
 MAX_ROWS = 20_000  #: of a table of permissible speeds
@@ -341,34 +333,3 @@ PATCH_KEYS = with_meanings(
     Key("curve", int, low=0, high=MAX_ROWS),
     Key("any_curve", int, low=0, high=MAX_ROWS),
 )
-
-
-def scene_tables() -> dict[str, tuple[Key, ...]]:
-    """Return the keys of every table by its heading, in the order of the reference page, each with its default."""
-    from coneskin.robot.reaction.types import Reaction
-    from coneskin.robot.stop.limits import MonitoringLimits
-
-    return {
-        "[arm]": ARM_KEYS,
-        "[[link]]": LINK_KEYS,
-        "[[link.sensor]]": (*FILE_KEYS, *SENSOR_KEYS),
-        "[source]": source_keys(),
-        "[[source.touch]]": TOUCH_KEYS,
-        "[reaction]": _with_defaults(REACTION_KEYS, Reaction),
-        "[[reaction.rule]]": RULE_KEYS,
-        "[monitoring]": _with_defaults(MONITORING_KEYS, MonitoringLimits),
-        "[recording]": RECORDING_KEYS,
-        "[motion]": MOTION_KEYS,
-        "[commissioning]": COMMISSIONING_KEYS,
-        "[[body]]": BODY_KEYS,
-        "[padding]": PADDING_KEYS,
-        "[speed_limit]": SPEED_LIMIT_KEYS,
-        "[[speed_limit.curve]]": CURVE_KEYS,
-        "[[speed_limit.patch]]": PATCH_KEYS,
-    }
-
-
-def _with_defaults(keys: Sequence[Key], settings: type) -> tuple[Key, ...]:
-    """Return keys with the defaults of the dataclass that takes their values."""
-    defaults = {field.name: field.default for field in fields(settings)}
-    return tuple(replace(key, default=defaults[key.plain]) if key.default is None else key for key in keys)
