@@ -105,16 +105,15 @@ class BoardCircuit(NamedTuple):
         for component in self.components:
             if package := catalog[component.part].get("adapter"):
                 others.append(Component(f"X{component.name}", "adapter", package, "", {}))
-        for component in [*self.components, *others]:
+        for component in [self.main_board, *self.components, *others]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
         rows.writerow(_LIST_COLUMNS.split(","))
-        own = _unsourced_limits(catalog[self.board.name]) if self.converter is None else ""
-        rows.writerow((1, "A1", self.facts.title, *[""] * 6, own))
         for (part, value), names in alike.items():
             row, count = catalog[part], len(names)
             told = row["what"], value, *_order_numbers(row, value), row["price"], f"{count * row['price']:.1f}"
-            rows.writerow((count, " ".join(names), *told, row["source"], _unsourced_limits(row)))
+            guessed = " ".join(name for name, where in row.get("sources", {}).items() if "not sourced" in where)
+            rows.writerow((count, " ".join(names), *told, row["source"], guessed))
         return lines.getvalue()
 
     def kicad_netlist(self) -> str:
@@ -253,11 +252,6 @@ def _order_numbers(row: Mapping[str, Any], value: str) -> tuple[str, str]:
     short = figure.replace(".", letter) if "." in figure else figure + letter
     long = f"{float(figure):#.3g}".replace(".", letter).removeprefix("0")
     return row["number"].format(short=short, long=long), row["second"].format(short=short, long=long)
-
-
-def _unsourced_limits(row: Mapping[str, Any]) -> str:
-    """Return the limits in a table of parts.toml that no document was found for, by their names."""
-    return " ".join(name for name, where in row.get("sources", {}).items() if "not sourced" in where)
 
 
 def switch_for(sensor: Sensor) -> tuple[str, dict[str, list[float]]]:

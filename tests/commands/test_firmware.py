@@ -67,7 +67,7 @@ def test_the_folder_holds_sketch_wiring_page_and_vectors(sensor_file, board, cap
     first = parts["R1"]
     assert first["value"] == "11.3 ohm"
     assert (first["number"], first["second source"]) == ("Yageo RC0805FR-0711R3L", "Vishay CRCW080511R3FKEA")
-    assert parts.pop("A1")["what"] == part_catalog()[board]["facts"]["title"]
+    assert parts["A1"]["value"] == part_catalog()[board]["facts"]["title"]
     assert parts["XU2"]["names"] == "XU2 XU5 XU6"  # adapters of the amplifier and the clamps
     for row in parts.values():
         assert float(row["EUR"]) == pytest.approx(int(row["count"]) * float(row["EUR each"]))
