@@ -88,13 +88,8 @@ class BoardCircuit(NamedTuple):
         return found
 
     @property
-    def main_board(self) -> Component:
-        """The board that the sketch runs on."""
-        return Component("A1", self.board.name, self.facts.title, "the board", self.pins)
-
-    @property
     def components(self) -> list[Component]:
-        """Everything on the board but the board itself, in order."""
+        """Everything, the board that the sketch runs on first."""
         return list(_components(self))
 
     def part_list(self) -> str:
@@ -105,7 +100,7 @@ class BoardCircuit(NamedTuple):
         for component in self.components:
             if package := catalog[component.part].get("adapter"):
                 others.append(Component(f"X{component.name}", "adapter", package, "", {}))
-        for component in [self.main_board, *self.components, *others]:
+        for component in [*self.components, *others]:
             alike.setdefault((component.part, component.value), []).append(component.name)
         rows = csv.writer(lines, lineterminator="\n")
         rows.writerow(_LIST_COLUMNS.split(","))
@@ -121,7 +116,7 @@ class BoardCircuit(NamedTuple):
         catalog = part_catalog()
         nets: dict[str, list[str]] = {}
         found: list[str] = []
-        for name, part, value, _, pins in [self.main_board, *self.components]:
+        for name, part, value, _, pins in self.components:
             row = catalog[part]
             told = value or row["number"]
             found.append(f'    (comp (ref "{name}") (value "{told}") (footprint "{row["footprint"]}"))')
@@ -276,6 +271,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
     def filtered(net: str, value: str, kind: str = "decoupling") -> Component:
         return two("C", kind, value, net, "GND")
 
+    yield Component("A1", circuit.board.name, circuit.facts.title, "the board", circuit.pins)
     yield filtered("5V", "10 uF")
     if parts.supply_volts == _FIXED_VOLTS:
         yield part("U", "regulator", IN="5V", OUT="REG", GND="GND")

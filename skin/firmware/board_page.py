@@ -69,13 +69,13 @@ def _settings(circuit: BoardCircuit) -> str:
 
 _WIDTH, _FIRST_ROW, _ROW_HEIGHT, _GROUP_GAP = 1520, 100, 15, 26  # of the drawing; of a row, between two groups
 _COLUMN_GROUPS = (  # x, and what stands there from top to bottom
+    (130, ("the board",)),
     (410, ("supply and current", "converter")),
     (730, ("switches", "clamps, at J1")),
     (1050, ("electrode A", "electrode B", "electrode C")),
     (1370, ("electrode D", "connector and test points")),
 )
 _NET_COLOURS = {"GND": "#555", "SHIELD": "#555", "5V": "#b02a1a", "3V3": "#b02a1a", "REG": "#b02a1a", "RAIL": "#b02a1a"}
-_PAIR_WORDS = "E drives an electrode, S reads it: two wires, a twisted pair."
 _SVG_STYLE = (
     "text{font:11px sans-serif;fill:#222}.title{font-size:18px;font-weight:bold}.group{font-size:14px;font-weight:bold}"
     "path,rect{fill:none;stroke:#222;stroke-width:1.2}rect{fill:#eef3f6}.name{font-weight:bold}"
@@ -86,19 +86,17 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
     """Return the drawing: every part with its pins, and at each pin the name of its net; equal names are joined."""
     catalog, lowest = part_catalog(), 0
     out: list[str] = []
-    board = circuit.main_board
-    columns: list[tuple[int, list[tuple[str, list[Component]]]]] = [(130, [(board.group, [board])])]
     for x, groups in _COLUMN_GROUPS:
-        parts = [(group, [c for c in circuit.components if c.group == group]) for group in groups]
-        columns.append((x, [each for each in parts if each[1]]))
-    for x, stack in columns:
         y = _FIRST_ROW
-        for group, components in stack:
+        for group in groups:
+            components = [c for c in circuit.components if c.group == group]
+            if not components:
+                continue
             out.append(_text(x - 110, y, group, "group"))
             y += 12
             for component in components:
                 row = catalog[component.part]
-                pads = {} if component is board else row["pins"]  # its own names stand on it
+                pads = {} if component.name == "A1" else row["pins"]  # its own names stand on it
                 drawn, height = _drawn(x, y, component, component.value or row["number"].split()[-1], pads)
                 out += drawn
                 y += height
@@ -109,7 +107,7 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
         f"<style>{_SVG_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{lowest + 10}" style="fill:#fff;stroke:none"/>',
         _text(20, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
-        _text(20, 58, f"Pins with the same word are joined; numbers are those of the pads. {_PAIR_WORDS}"),
+        _text(20, 58, "Pins of the same word are joined; numbers are pads. E drives, S reads: a twisted pair."),
     ]
     return "\n".join([*head, *out, "</svg>", ""])
 
