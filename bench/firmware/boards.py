@@ -46,12 +46,12 @@ def main() -> None:
     rows, causes = [], []
     for name, converter in OFFERED:
         found = [judge(name, converter, seed) for seed in range(args.boards)]
-        rows.append(row(name if converter == "built-in" else f"{name}, {converter}", found))
+        title, third = name if converter == "built-in" else f"{name}, {converter}", max(1, args.boards // 3)
+        rows.append(row(title, found))
+        causes.append([title])
         for cause in found[0].cause:
             ordered = [1e3 * each.error for each in sorted(found, key=lambda each: abs(each.cause[cause]))]
-            third = max(1, len(ordered) // 3)
-            ends = statistics.fmean(ordered[:third]), statistics.fmean(ordered[-third:])
-            causes.append([f"{name}, {converter}", cause, *(f"{end:.2f}" for end in ends)])
+            causes[-1].append(f"{statistics.fmean(ordered[:third]):.2f}..{statistics.fmean(ordered[-third:]):.2f}")
     few = max(1, args.boards // 10)
     for title, options in (
         ("the ESP32's own converter", {"esp32": True}),
@@ -65,8 +65,8 @@ def main() -> None:
     show(f"{args.boards} boards of each kind; {few} of those that are not offered", columns, rows)
     if args.causes:
         show(
-            "The worst place [mm], mean of a third of the boards",
-            ["board", "cause", "least of it", "most of it"],
+            "The worst place [mm], mean of the third of the boards with the least .. the most of a cause",
+            ["board", *found[0].cause],
             causes,
         )
 
