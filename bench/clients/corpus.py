@@ -83,7 +83,7 @@ def show(found: list[Found]) -> None:
         stops = sum(bool(one.told) for one in runs)
         rows.append([name or "all", len(here), len(runs), f"{100.0 * len(runs) / len(here):.1f} %", stops])
     report.show("programs that run", ["folder", "programs", "run", "share", "end in a protective stop"], rows)
-    rest = [[one.name, " ".join(one.why.split())[:120]] for one in found if one.why]
+    rest = [[one.name, " ".join(one.why.split())[:60]] for one in found if one.why]
     report.show("the rest", ["program", "why it does not run"], rest)
 
 

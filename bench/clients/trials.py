@@ -73,7 +73,7 @@ def show(trials: Iterable[Trial]) -> None:
         counts.setdefault(trial.client, Counter())[result] += 1
         if result in ("later", "fail"):
             why = explain(trial) or f"not explained: {trial.why}"
-            rest.append([trial.client, trial.test, result, " ".join(why.split())[:200]])
+            rest.append([trial.client, trial.test, result, " ".join(why.split())[:80]])
     of_all = sum(counts.values(), Counter())
     judged = of_all["pass"] + of_all["later"] + of_all["fail"]
     title = f"{of_all['pass']} of {judged} pass at the first try, {of_all['later']} at the second or third"
