@@ -315,8 +315,8 @@ def _joints(placed: Sequence[PlacedSheet], first: int) -> dict[int, dict[str, di
     for (i, one), (j, two) in combinations(enumerate(placed, first), 2):
         gaps = sheet_gap(one.sheet, two.sheet), sheet_gap(two.sheet, one.sheet)
         shares = [u / sheet.place.frustum.slant for (_, u), sheet in zip(gaps, (one, two), strict=True)]
-        axes = (sheet.place.link_frustum.rotate((0.0, 0.0, 1.0)) for sheet in (one.sheet, two.sheet))
-        along = abs(float(np.dot(*axes))) > _JOINED_COSINE
+        axis, other = (sheet.place.link_frustum.rotate((0.0, 0.0, 1.0)) for sheet in (one.sheet, two.sheet))
+        along = abs(float(np.dot(axis, other))) > _JOINED_COSINE
         if along and gaps[0][0] < _NEAR_SHEET and all(abs(share - 0.5) > 0.45 for share in shares):
             count += 1
             ends = [f"end {1 if share < 0.5 else 2}" for share in shares]
