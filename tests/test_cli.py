@@ -259,6 +259,7 @@ def test_replay_says_that_the_events_are_the_same(tmp_path: Path, capsys: Output
     assert "the events are the same, bit by bit" in out
 
 
+@pytest.mark.long
 def test_replay_of_a_run_that_is_cut_or_changed(tmp_path: Path, capsys: Output) -> None:
     record(tmp_path / "run.rec")
     data = (tmp_path / "run.rec").read_bytes()
@@ -277,6 +278,7 @@ def test_replay_of_a_run_that_is_cut_or_changed(tmp_path: Path, capsys: Output) 
     assert "none.toml: 1 mistake" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_recording_of_another_guard_ends_with_1(tmp_path: Path, capsys: Output) -> None:
     """The same bytes and other events: the exit code tells a script."""
     record(tmp_path / "run.rec")

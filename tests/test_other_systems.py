@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.sweep import sweep
 
 IMITATION = """
 import asyncio, concurrent.futures.process, importlib.metadata, logging.handlers, multiprocessing.context, os, select
@@ -92,7 +93,7 @@ def test_a_run_is_replayed_and_a_link_unrolled(system: str, tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="imitates other systems on Linux")
-@pytest.mark.parametrize(("system", "said"), [("win32", "COM3"), ("darwin", "/dev/cu.usbserial-1")])
+@pytest.mark.parametrize(("system", "said"), sweep([("win32", "COM3"), ("darwin", "/dev/cu.usbserial-1")]))
 def test_a_scene_is_checked(system: str, said: str, tmp_path: Path) -> None:
     scene = f"""
 [[link]]
@@ -111,6 +112,7 @@ port = "{said}"
     assert said in done.stdout, done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="imitates other systems on Linux")
 def test_what_needs_a_pseudo_terminal_is_refused_on_windows_with_a_remedy(tmp_path: Path) -> None:
     code = "from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal; open_raw_terminal()"

@@ -76,6 +76,7 @@ def test_sensor_file_loads_and_its_corners_are_the_inner_corners_of_the_electrod
                 assert [1e3 * x for x in placed.point(u, phi)] == pytest.approx(want, abs=1e-3)  # json has 4 digits
 
 
+@pytest.mark.long
 def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_path, capsys):
     assert design(*BALL, *sets("sheet.sheet_gap_mm=2"), "--json", "-o", str(tmp_path / "out")) == 0
     data = json.loads(capsys.readouterr().out)
@@ -89,6 +90,7 @@ def test_two_sheets_of_a_rugby_ball_keep_the_gap_and_lead_their_wires_away(tmp_p
     assert "| tabs | over end 2 |" in report
 
 
+@pytest.mark.long
 def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_path):
     waist = [
         "--radius1-mm",
@@ -111,6 +113,7 @@ def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_pat
     assert apart - 2.0 * outer == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.long
 def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
     assert design(*CYLINDER, *sets("sheet.seam_gap_mm=1.5"), "-o", str(tmp_path / "out")) == 0
     cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
@@ -289,6 +292,7 @@ def test_missing_packages_are_named(tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_numbers_of_the_report_are_those_of_the_drawings(tmp_path):
     words = [*CYLINDER, *sets("layers.assembly=bonded", "layers.material=['a', 'b', 'c', 'd', 'e']")]
     words += sets("electronics.adc_bits=10", "electronics.supply_v=3.0", "electronics.current_full_scale_ma=30")

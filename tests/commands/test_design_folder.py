@@ -47,6 +47,7 @@ def turned(profile: list[tuple[float, float]], sides: int = 72) -> Iterator[Tria
             yield a, f, e
 
 
+@pytest.mark.long
 def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path, cylinder_design: Path) -> None:
     out = tmp_path / "out"
     shutil.copytree(cylinder_design, out)
@@ -128,6 +129,7 @@ def test_a_mesh_whose_name_is_no_text_is_designed(tmp_path: Path) -> None:
     assert design(str(mesh), "--set", 'layers.material=["a\\nb", "c", "d", "e", "f"]', "-o", str(tmp_path / "bad")) == 1
 
 
+@pytest.mark.long
 def test_a_package_of_a_urdf_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "urdf").mkdir()
     (tmp_path / "elsewhere" / "meshes").mkdir(parents=True)
@@ -193,6 +195,7 @@ def test_a_step_file_that_cannot_be_written_is_refused_before_the_search(
     assert "reading" not in err
 
 
+@pytest.mark.long
 def test_the_next_command_names_the_link_where_the_design_knows_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

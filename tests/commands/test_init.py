@@ -123,6 +123,7 @@ def test_a_sheet_beside_the_axis_of_its_link_is_warned_of(here: Path, capsys: Ou
     assert "warning: link forearm, sheet 1 lies 300 mm beside the axis of the forearm" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_link_longer_than_the_arms_is_of_another_arm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
 ) -> None:

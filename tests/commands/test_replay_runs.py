@@ -86,6 +86,7 @@ def test_a_variant_that_cannot_be_is_named_with_its_reason(capsys: pytest.Captur
     assert "the contacts that they recorded count as the truth there" in out
 
 
+@pytest.mark.long
 def test_several_values_make_a_row_each(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     words = ["--vary", "detection.touch_level=0.1,0.2", "--jobs", "1", "--json"]
     assert main(["replay", str(COLLISION), *words]) == 0
@@ -96,6 +97,7 @@ def test_several_values_make_a_row_each(capsys: pytest.CaptureFixture[str], tmp_
     assert "is a .parquet file" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_detector_itself_can_be_another_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(COLLISION), "--set", "detector.confirm_frames=2", "--json"]) == 0
     (touch, *_) = json.loads(capsys.readouterr().out)["comparison"]["differences"]

@@ -98,6 +98,7 @@ def test_export_names_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (tmp_path / "run.npz").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_a_cut_is_around_the_first_touch_where_nothing_else_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -42,6 +42,7 @@ def test_longer_whole_numbers_are_floats() -> None:
     assert read_json(b"[-" + b"1" * 5000 + b"]") == [-math.inf]
 
 
+@pytest.mark.long
 @given(st.recursive(ANY_TEXT, lambda inner: st.lists(inner) | st.dictionaries(ANY_TEXT, inner), max_leaves=8))
 @example("\udcff")
 @example({"\ud800": ["\udfff"]})

@@ -98,6 +98,7 @@ def test_sheets_apart_stay_as_they_are() -> None:
     assert clear_of_each_other(places, THICKNESS, 1e-3) == places
 
 
+@pytest.mark.long
 def test_a_sheet_between_two_others_is_drawn_back_for_its_wires() -> None:
     """Three coaxial sheets 4 mm apart: tabs of 12 mm do not fit between them."""
     places = [at(0.104 * k, Frustum(0.05, 0.05, 0.1)) for k in range(3)]
@@ -108,6 +109,7 @@ def test_a_sheet_between_two_others_is_drawn_back_for_its_wires() -> None:
     assert 0.012 < 0.3 - sum(design.place.frustum.slant for design in designs) < 0.03
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrap_deg", [150.0, 200.0])
 def test_a_sheet_whose_ends_are_taken_is_wired_at_an_edge(wrap_deg: float) -> None:
     places = [at(0.104 * k, Frustum(0.05, 0.05, 0.1, math.radians(wrap_deg))) for k in range(3)]

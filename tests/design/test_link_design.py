@@ -107,6 +107,7 @@ def test_what_cannot_be_covered_says_why() -> None:
         cs.design_link(tube(), min_length=0.3)
 
 
+@pytest.mark.long
 def test_drawings_name_their_extents(tmp_path: Path) -> None:
     """Some cutters compare them with their bed, and a viewer shows them first."""
     ezdxf = pytest.importorskip("ezdxf")

@@ -39,6 +39,7 @@ def shares(axes: object, *names: str) -> list[float]:
     return [float(np.mean(np.abs(hues - hue) < 0.01)) for hue in wanted]
 
 
+@pytest.mark.long
 def test_a_sheet_hides_the_link_under_it_and_bare_ends_have_the_colours_of_their_reasons() -> None:
     side = Frustum(RADIUS, RADIUS, LENGTH)
     designs = design_sheets([PlacedFrustum(side)], DesignOptions())
@@ -61,6 +62,7 @@ def test_a_place_has_the_reason_of_most_samples_near_it() -> None:
     assert _reasons(np.array([[0.2, 0.0, 0.0], [0.7, 0.0, 0.0]]), areas).tolist() == [0, 1]
 
 
+@pytest.mark.long
 def test_what_counts_is_drawn_in_the_colours_of_its_weights() -> None:
     """Half of a tube counts, half does not: each place has the colour of the nearest place of the map."""
     from matplotlib import colormaps

@@ -55,6 +55,7 @@ def test_sheet_and_strip_together_close_the_turn(name: str, side: SheetSide, gap
         assert (found, height) == (pytest.approx(u, abs=1e-9), pytest.approx(outer, abs=1e-9))
 
 
+@pytest.mark.long
 def test_only_full_wraps_have_a_seam_to_cover() -> None:
     options = DesignOptions(cover_seam=True)
     designs = cover_seams(design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15), options))
@@ -94,6 +95,7 @@ def test_the_guide_places_a_strip_by_the_seam_below_it() -> None:
     assert f"| {1e3 * back:.1f} mm at end 1" in text
 
 
+@pytest.mark.long
 def test_a_scene_takes_both_sensors_without_suspicion(tmp_path: Path) -> None:
     from coneskin.scene.reader import parse_scene
     from coneskin.scene.suspicions import suspicions

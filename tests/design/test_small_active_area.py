@@ -44,6 +44,7 @@ def test_what_is_advised_for_a_short_sheet_leaves_what_is_said():
     assert chosen > LEAST_ACTIVE_SHARE
 
 
+@pytest.mark.long
 def test_nothing_is_said_of_a_sheet_of_which_enough_is_active():
     shares = {height: design_of(0.036, 1e-3 * height).layout.active_share for height in range(26, 60)}
     for height, share in shares.items():

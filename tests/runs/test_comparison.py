@@ -149,6 +149,7 @@ def test_a_command_has_the_tolerance_of_its_quantity(what: str, tolerances: Tole
     assert not one.equals(one._replace(time=1.006), Tolerances(time=0.005))
 
 
+@pytest.mark.long
 def test_a_cut_is_the_same_as_its_run_within_the_tolerances_of_a_cut(collision: Run, tmp_path: Path) -> None:
     cut = read_run(cut_run(collision, tmp_path / "cut.rec", around=2.95).path)
     sides = recorded_decisions(collision), recorded_decisions(cut)

@@ -36,6 +36,7 @@ def test_a_cut_replays_to_the_same_contact_and_reaction(collision: Run, tmp_path
     assert summary["duration_s"] < 1.2
 
 
+@pytest.mark.long
 def test_a_cut_that_shows_another_reaction_says_so(collision: Run, tmp_path: Path) -> None:
     assert cut_run(collision, tmp_path / "cut.rec", around=2.95).other_reaction == ""
     late = collision.start + 1.5  # from here on the controller's states come 60 ms late, which a cut cannot know
@@ -92,6 +93,7 @@ def test_where_there_is_no_contact_nothing_is_cut(
     assert not (tmp_path / "cut.rec").exists()
 
 
+@pytest.mark.long
 @pytest.mark.pure
 def test_a_cut_that_the_disk_does_not_take_leaves_nothing(
     collision: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -105,6 +107,7 @@ def test_a_cut_that_the_disk_does_not_take_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_cut_says_that_its_events_are_those_of_todays_code(collision: Run, tmp_path: Path) -> None:
     run = read_run(cut_run(collision, tmp_path / "cut.rec", around=2.95).path)
     assert run.recorded_by == recorded_version(code_versions())

@@ -48,6 +48,7 @@ def test_a_retreat_leads_away_from_what_has_one_certain_place_only() -> None:
     assert moved == {"hand"}
 
 
+@pytest.mark.long
 def test_a_command_takes_a_run_of_the_gallery(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", "gallery:palm", "--events"]) == 0
     assert "the same, bit by bit" in capsys.readouterr().out

@@ -22,6 +22,7 @@ from coneskin.scene.summary import summarize
 from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from tests.support.scenes import commissioned, write_passed_record
+from tests.support.sweep import sweep
 
 from .scenes import SERIAL_RETREAT, SKIN_ONLY, inputs
 
@@ -219,7 +220,7 @@ STOP_WITH_RULE = VIRTUAL_RETREAT.replace('kind = "retreat"', 'kind = "stop"') + 
 
 
 @pytest.mark.promise("P12")
-@pytest.mark.parametrize("text", [VIRTUAL_RETREAT, STOP_WITH_RULE], ids=["retreat", "a rule that complies"])
+@pytest.mark.parametrize("text", sweep([VIRTUAL_RETREAT, STOP_WITH_RULE]), ids=["retreat", "a rule that complies"])
 def test_without_a_record_the_arm_only_stops_and_says_so(text: str, tmp_path: Path) -> None:
     scene = scene_in(tmp_path, text)
     touch = ScriptedTouch(0.3, 0.5, 0.2, 2.5, sensor="upper arm skin")

@@ -59,6 +59,7 @@ def leaves(place: Any, way: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
         yield way
 
 
+@pytest.mark.long
 def test_every_value_of_a_scene_can_be_set_and_nothing_else_changes() -> None:
     rules = override_settings(FULL, {"reaction.rule": [{"link": "forearm", "kind": "stop"}], "arm.table_z_mm": 2})
     ways = [way for way in leaves(tomllib.loads(rules)) if way[0] not in ("source", "motion", "recording")]

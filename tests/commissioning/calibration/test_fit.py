@@ -82,6 +82,7 @@ def test_a_perfect_skin_is_mostly_left_alone() -> None:
     assert all(fit.map_error > 0.05e-3 for fit in fits)  # so well do nine touches exclude that anything is wrong
 
 
+@pytest.mark.long
 def test_the_error_of_the_map_is_what_is_stated_for_places_that_nobody_touched() -> None:
     sensor, rng = SENSORS[0], random.Random(3)
     true = PlaceMap(sensor.frustum, *BENT)

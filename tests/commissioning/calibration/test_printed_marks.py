@@ -45,6 +45,7 @@ def test_crosses_lie_between_the_electrodes_at_ten_fifty_and_ninety_percent() ->
         assert min(math.hypot(x - label.x, y - label.y) for label in numbers.values()) < 0.008
 
 
+@pytest.mark.long
 def test_a_calibration_asks_for_the_printed_marks_of_its_design(tmp_path: Path, capsys: Output) -> None:
     data = write_design(tmp_path / "skin", designed(Frustum(0.03, 0.05, 0.15, 5.0)), pictures=False)
     marks = data["sheets"][0]["touch_marks"]

@@ -165,6 +165,7 @@ def test_a_torn_end_is_said(whole: bytes, tmp_path: Path, cut: int) -> None:
     assert "the recording was not closed: nothing is known after" in missing(recording)
 
 
+@pytest.mark.long
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_no_damage_yields_a_false_block_or_hides_an_intact_one(

@@ -153,6 +153,7 @@ def test_a_handle_designs_the_sheet_again_and_is_said(bench: Workbench) -> None:
     assert bench.designs[0].place.frustum.height == pytest.approx(0.10)
 
 
+@pytest.mark.long
 def test_moves_of_one_handle_are_undone_at_once(bench: Workbench) -> None:
     whole = bench.wish
     for step in range(1, 5):
@@ -286,6 +287,7 @@ def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench
         assert "1 sheet" in page._said.content
 
 
+@pytest.mark.long
 def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: Workbench, tmp_path: Path) -> None:
     pytest.importorskip("viser", reason="viser is not installed: no page is served")
     data = stl(bench.link.mesh)

@@ -60,6 +60,7 @@ class Counted(np.ndarray):
         return getattr(ufunc, method)(*plain, **options)
 
 
+@pytest.mark.long
 def test_a_facet_of_a_fine_round_link_is_held_against_its_like_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.06)
     mesh = make_mesh(np.array(ball.vertices), np.array(ball.faces), "ball")

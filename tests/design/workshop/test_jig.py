@@ -103,6 +103,7 @@ def test_the_gap_to_cone_and_sheet_is_the_clearance(frustum: Frustum) -> None:
             assert sleeve.min() == pytest.approx(stack.thickness + 0.5e-3 * side.cos_half_angle, abs=2e-6)
 
 
+@pytest.mark.long
 def test_the_lip_ends_at_the_datum_and_clear_of_what_stands_out() -> None:
     mesh = tube(bump=1.0)
     design = sheet(Frustum(0.05, 0.05, 0.2), POSE)

@@ -63,6 +63,7 @@ def test_faces_are_those_on_which_the_next_thing_is_glued_unless_asked_otherwise
             assert f"{wanted.upper()} FACE UP" in words
 
 
+@pytest.mark.long
 def test_a_part_seen_from_inside_is_the_mirror_image():
     layout = lay_out_sheet(SHEETS["widening"])
     pairs = [cut_sheets(layout, PAPER_STACK, face_up=face) for face in ("outside", "inside")]

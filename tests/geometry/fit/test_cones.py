@@ -81,7 +81,7 @@ def surface_misses(sheet: FittedSheet, body_radius: dict[str, float] | None = No
         pytest.param(lambda b: flipped(b, 0.5), 1e-4, 1e-3, 1e-5, marks=pytest.mark.long),
         pytest.param(exploded, 1e-4, 1e-3, 1e-5, marks=pytest.mark.long),
         # 0.2 mm of noise over 3000 corners and a lever of 0.1 m: some 0.01 degrees, some 0.02 mm
-        (lambda b: noisy(b, 2e-4), 0.03, 0.06, 2e-4),
+        pytest.param(lambda b: noisy(b, 2e-4), 0.03, 0.06, 2e-4, marks=pytest.mark.long),
     ],
     ids=["clean", "flipped", "half-flipped", "exploded", "noisy"],
 )
@@ -150,6 +150,7 @@ def test_more_sheets_cover_more_of_a_curved_body() -> None:
     assert covers[0] + 0.1 < covers[1] < covers[2]
 
 
+@pytest.mark.long
 def test_a_tube_needs_one_sheet_however_many_are_allowed() -> None:
     assert len(cones(placed(frustum(0.05, 0.05, 0.2)), max_sheets=6).sheets) == 1
 
@@ -337,6 +338,7 @@ def test_what_is_advised_works_when_followed() -> None:
         assert cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
 
 
+@pytest.mark.long
 def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> None:
     body = placed(revolve([(0.0, 0.001), (0.15, 0.06)], segments=96, rings=30))
     (sheet,) = cones(body, min_radius=0.009).sheets

@@ -38,9 +38,8 @@ def asked_for(fit: LinkFit) -> list[int]:
     return [int(found[1]) for bare in fit.bare_areas if (found := re.search(r"allow (\d+) sheets", bare.reason))]
 
 
-@pytest.mark.parametrize(
-    "name", ["double cone", *(pytest.param(n, marks=pytest.mark.long) for n in BODIES if n != "double cone")]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", BODIES)
 def test_a_sheet_more_covers_more_until_none_is_advised(name: str) -> None:
     mesh = BODIES[name]()
     fit = cones(mesh, max_sheets=1)

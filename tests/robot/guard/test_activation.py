@@ -114,6 +114,7 @@ def test_an_arm_that_moves_while_a_reset_settles_is_stopped():
     assert max(map(abs, rig.arm.qd)) < 0.01
 
 
+@pytest.mark.long
 def test_a_fault_of_the_line_that_goes_on_is_reported_after_a_reset_again():
     rig = reset()
     rig.run(0.3)

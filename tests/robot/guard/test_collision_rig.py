@@ -53,6 +53,7 @@ def test_a_person_presses_as_firmly_as_wanted_on_an_arm_that_stands() -> None:
     assert hit.force == pytest.approx(30.0, abs=0.5)
 
 
+@pytest.mark.long
 def test_the_same_seed_is_the_same_collision() -> None:
     qd = [math.copysign(0.7, approach([1.0, 0, 0, 0, 0, 0])), 0, 0, 0, 0, 0]
     first, second = (collide(qd, Body("one", U, PHI))[0] for _ in range(2))

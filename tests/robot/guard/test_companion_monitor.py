@@ -134,7 +134,7 @@ def test_a_process_that_waits_for_a_processor_is_no_fault_for_half_a_second(exte
 
 
 @pytest.mark.promise("P40")
-@pytest.mark.parametrize("waits", [False, True])
+@pytest.mark.parametrize("waits", sweep([False, True]))
 def test_the_second_guard_watchdog_is_missed_too_though_the_first_one_lives(waits):
     rig = GuardRig(speed=1.0, external=True).run(0.5)
     rig.companions.second_is_mute = True

@@ -29,10 +29,12 @@ def test_two_hands_are_a_centroid_and_a_line():
     assert abs(cosine) > 0.999
 
 
+@pytest.mark.long
 def test_one_finger_is_none():
     assert pressed(touch(0.5)) == []
 
 
+@pytest.mark.long
 def test_hands_beside_the_seam_lie_about_it():
     wrap = CONE.frustum.wrap
     (event,) = pressed(touch(0.5, phi=0.6), touch(0.5, phi=wrap - 0.6))

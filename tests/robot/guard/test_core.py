@@ -310,7 +310,10 @@ def test_nonsense_never_raises_and_never_arms(inputs):
     assert core.phase is not Phase.ACTIVE
 
 
-@pytest.mark.parametrize("script", [(), (touch(0.5, 0.7),), (touch(0.4, 0.45), touch(0.46))])
+@pytest.mark.parametrize(
+    "script",
+    [(touch(0.5, 0.7),), *(pytest.param(s, marks=pytest.mark.long) for s in ((), (touch(0.4, 0.45), touch(0.46))))],
+)
 def test_the_same_inputs_give_the_same_run_bit_by_bit(script):
     rig = GuardRig(*script, speed=1.0).run(1.3)
     again: GuardCore = make_core(list(rig.skin.sensors), Reaction(kind="retreat"))

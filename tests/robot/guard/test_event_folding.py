@@ -37,6 +37,7 @@ def test_a_loose_plug_of_a_night_is_a_hundred_lines():
     assert out[:10] == [e for e in out if "count" not in e.details]
 
 
+@pytest.mark.long
 def test_states_that_are_no_numbers_are_one_fault_and_counts():
     """500 events a second before, and a list of faults that grew with each."""
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction("stop"), speed=1.0).run(1.0)

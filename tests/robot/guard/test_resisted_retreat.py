@@ -13,6 +13,7 @@ from coneskin.skin.sensor import Sensor
 from tests.support.collision_rig import CollisionRig, SkinOnLink
 from tests.support.guard_rig import CONE, LINK, MODEL, START_Q
 from tests.support.pressing_body import Body
+from tests.support.sweep import sweep
 
 QD = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 U = 0.13
@@ -55,6 +56,7 @@ def opposite(gap: float) -> Body:
     return Body("one", U, (PHI + math.pi) % (2 * math.pi), 0.05, gap, 20e3, hardest=200.0)
 
 
+@pytest.mark.long
 def test_a_retreat_from_one_hand_is_made():
     rig = collide(Reaction("retreat", distance=0.03), HAND)
     assert event(rig, "retreated").details["complete"] is True
@@ -81,7 +83,7 @@ class LaggingRig(CollisionRig):
 
 
 @pytest.mark.promise("P31")
-@pytest.mark.parametrize("kind", ["retreat", "comply"])
+@pytest.mark.parametrize("kind", sweep(["retreat", "comply"]))
 def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kind):
     """Up to 9.8 mm farther into a second hand before, where frames came up to 0.25 s late."""
     skin = SkinOnLink(Sensor(CONE.frustum, 0, name="one"), LINK, CONE)

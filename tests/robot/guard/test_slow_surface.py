@@ -31,6 +31,7 @@ def test_an_arm_that_moves_into_the_touch_is_stopped_as_by_a_stop(heeds):
     assert not any(event.name == "speed_reduced" for event in rig.events)
 
 
+@pytest.mark.long
 def test_what_moves_into_the_touch_slowly_may_do_so_by_a_little():
     """0.03 rad/s of the base, 13 mm/s: a stop takes it 0.02 mm into the touch; the slow arm is stopped at 0.5 mm."""
     rig = GuardRig(touch(0.5, 5.0, phi=PHI), reaction=SLOW, speed=0.03).run(2.0)

@@ -179,6 +179,7 @@ _WORDS = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.long
 @settings(max_examples=150)
 @given(st.lists(_WORDS, max_size=60))
 def test_words_in_any_order_never_end_the_controller(words: list[str]) -> None:

@@ -88,6 +88,7 @@ def _equal(one: list, other: list) -> bool:
     return all(a == b or (a != a and b != b) for a, b in zip(one, other, strict=True))
 
 
+@pytest.mark.long
 def test_parquet_is_read_back_equal_by_duckdb_and_by_pyarrow(
     collision: Run, tables: dict[str, Table], tmp_path: Path
 ) -> None:
@@ -119,6 +120,7 @@ def test_npz_is_read_back_equal(collision: Run, tables: dict[str, Table], tmp_pa
                 assert all(a == "" or math.isnan(a) for a in absent)
 
 
+@pytest.mark.long
 def test_mcap_is_read_back_equal_and_fits_its_schemas(collision: Run, tables: dict[str, Table], tmp_path: Path) -> None:
     reader = pytest.importorskip("mcap.reader")
     jsonschema = pytest.importorskip("jsonschema")
@@ -201,6 +203,7 @@ def test_an_export_that_fails_leaves_nothing_torn(
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
+@pytest.mark.long
 def test_a_table_in_pieces_is_the_table(
     collision: Run, tables: dict[str, Table], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

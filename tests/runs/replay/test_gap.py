@@ -8,6 +8,7 @@ from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
 from coneskin.runs.replay.run import Verdict, read_run
+from tests.support.sweep import sweep
 
 from ...scene.scenes import record
 
@@ -26,7 +27,7 @@ def with_a_gap(whole, cut, since, until):
 
 
 @pytest.mark.promise("P56")
-@pytest.mark.parametrize("since", [1000.3, 1000.7])  # before and within the touch at 0.6 s
+@pytest.mark.parametrize("since", sweep([1000.3, 1000.7]))  # before and within the touch at 0.6 s
 def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, since):
     happened = record(tmp_path / "whole.rec")
     with_a_gap(tmp_path / "whole.rec", tmp_path / "cut.rec", since, 1001.0)
@@ -41,6 +42,7 @@ def test_it_is_compared_up_to_the_gap_and_says_where_that_is(tmp_path, capsys, s
     assert f"missing: {run.missing}" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_difference_before_the_gap_is_found(tmp_path):
     record(tmp_path / "whole.rec")
     with_a_gap(tmp_path / "whole.rec", tmp_path / "cut.rec", 1001.2, 1001.4)

@@ -106,6 +106,7 @@ def test_a_slow_run_shows_its_slider_and_ends_where_the_arm_goes_on(
     assert speeds.get_xlim() == pytest.approx((-300.0, 894.0))  # the data end there
 
 
+@pytest.mark.long
 def test_marks_that_would_hide_each_other_share_a_label(run: Run, tmp_path: Path, figures: list[Any]) -> None:
     """After a stop, the arm is latched where it stands."""
     contact = next(event for event in run.events if event.name == "contact")
@@ -135,12 +136,14 @@ def test_a_file_that_cannot_be_is_refused(run: Run, tmp_path: Path, name: str, w
     assert [path.name for path in tmp_path.iterdir()] == ["folder.png"]
 
 
+@pytest.mark.long
 def test_a_skin_without_an_arm(tmp_path: Path, figures: list[Any]) -> None:
     record(tmp_path / "run.rec", SKIN_ONLY)
     draw_run(read_run(tmp_path), tmp_path / "run.svg")
     assert len(figures[0].axes) == 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kinds",
     sweep([{BlockKind.ARM}, {BlockKind.SKIN}, {BlockKind.EVENT}, {BlockKind.EVENT, BlockKind.SKIN, BlockKind.ARM}]),

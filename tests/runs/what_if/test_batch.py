@@ -55,6 +55,7 @@ def check(rows: Sequence[Mapping[str, Any]]) -> None:
     assert "touch is missing" in a_deaf["first_difference"]
 
 
+@pytest.mark.long
 def test_a_table_over_runs_and_variants(runs: list[Path], tmp_path: Path) -> None:
     rows = judge_runs(runs, VARIANTS, jobs=1)
     check(rows)

@@ -99,6 +99,7 @@ def judged(path: Path, run: Run, touches: Sequence[dict[str, Any]]) -> dict[str,
     return row
 
 
+@pytest.mark.long
 def test_missed_touches_false_alarms_and_delay_need_no_labels(collision: Run, tmp_path: Path) -> None:
     seen = touch(collision, TOUCHED, TOUCHED + 0.15)
     row = judged(tmp_path / "a.rec", collision, [seen, touch(collision, 2.0, 2.2), touch(collision, 60.0, None)])
@@ -108,6 +109,7 @@ def test_missed_touches_false_alarms_and_delay_need_no_labels(collision: Run, tm
     assert (row["touches"], row["missed"], row["false_alarms"]) == (0, 0, 1)
 
 
+@pytest.mark.long
 def test_a_cut_keeps_what_touched_the_skin_in_its_time(collision: Run, tmp_path: Path) -> None:
     touches = [touch(collision, 0.1, 0.2), touch(collision, TOUCHED, TOUCHED + 0.15)]
     cut = cut_run(told(collision, {"touches": touches}), tmp_path / "cut.rec", around=2.95)

@@ -91,6 +91,7 @@ def test_unknown_keys_of_a_file_are_reported(tmp_path: Path) -> None:
     assert problems == ["s: unknown key radius_mm; did you mean radius2_mm?"]
 
 
+@pytest.mark.long
 def test_the_files_of_a_design_are_sensors_of_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rugby ball, from radii to cut files to the two sensors of a scene: one chain, no hand in it."""
     pytest.importorskip("ezdxf", reason="the extra coneskin[design] is not installed")

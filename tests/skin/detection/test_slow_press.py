@@ -44,6 +44,7 @@ def test_a_hand_laid_on_over_ten_minutes_is_a_touch(newtons):
     assert not any(isinstance(event, TouchEnded) for event in events)
 
 
+@pytest.mark.long
 def test_a_press_that_lasts_ten_minutes_stays_as_firm():
     hand = ScriptedTouch(5.0, 5.0 + TEN_MINUTES, 0.1, 2.0, force=1.0, rise=0.1)
     skin = VirtualSkin(SENSOR, [hand], rate_hz=RATE, duration=620.0, model="ladder")

@@ -35,6 +35,7 @@ def test_theta_error_vanishes_on_the_middle_line_and_is_odd_about_it() -> None:
     assert math.isnan(error_map(model, 15.0, np.array([110.0, 150.0]), np.array([45.0])).u_error[0, 0])
 
 
+@pytest.mark.long
 def test_demo_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--json", "--no-pictures"]) == 0
     printed = json.loads(capsys.readouterr().out)
@@ -89,6 +90,7 @@ def test_each_error_map_frames_the_areas_of_the_table(tmp_path, monkeypatch: pyt
     assert all(np.ptp(line.get_ydata()) > 0.01 for line in beside.lines), "deg: no panel of what is zero by symmetry"
 
 
+@pytest.mark.long
 def test_demo_names_a_mistake_without_a_traceback(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path
 ) -> None:

@@ -10,6 +10,7 @@ from coneskin.robot.guard.phase import Phase
 from coneskin.robot.reaction.rules import Rule
 from coneskin.robot.reaction.types import Reaction
 from tests.support.guard_rig import GuardRig, felt, touch
+from tests.support.sweep import sweep
 
 from ..reactions import comply
 
@@ -19,7 +20,7 @@ def progress(before, after, normal):
 
 
 @pytest.mark.promise("P01")
-@pytest.mark.parametrize("external", [False, True])
+@pytest.mark.parametrize("external", sweep([False, True]))
 def test_it_gives_way_while_it_is_pushed_and_stops_with_the_push(external):
     rig = GuardRig(touch(0.5, 1.0), reaction=comply(), speed=1.0, external=external).run(0.7)
     assert rig.core.phase is Phase.RETREATING
@@ -147,6 +148,7 @@ def test_an_arm_that_something_else_moves_is_not_left_to_it(external):
     assert max(map(abs, rig.arm.qd)) < 0.01
 
 
+@pytest.mark.long
 def test_a_slow_arm_has_its_time_to_take_up_its_speed():
     reaction = Reaction(kind="retreat", acceleration=0.25, speed=0.3, time_budget=10.0, arm_distance=0.5)
     rig = GuardRig(touch(0.5, 0.7), reaction=reaction, external=True, speed=1.0).run(3.6)

@@ -148,6 +148,7 @@ def test_the_ratio_is_that_of_the_jacobian(q: list[float], qd: list[float]) -> N
     assert found == pytest.approx(worst, rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.long
 def test_a_program_that_asks_for_too_much_is_slowed_before_it_is_too_fast() -> None:
     loop = Loop().run(2.0, speed=1.0)
     assert loop.why == ""
@@ -346,6 +347,7 @@ def test_a_setting_that_crosses_a_persons_on_its_way_is_taken_back() -> None:
     assert loop.limit.setting.ceiling == 0.05
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("touched", [False, True])
 def test_a_guard_that_ends_puts_the_slider_back_once_the_arm_stands(touched: bool) -> None:
     touches = [touch(1.0, 1.1)] if touched else []

@@ -55,6 +55,7 @@ def _corner(radius: float) -> tuple[float, float, int]:
     return nearest, slowest, case.controller.cycle
 
 
+@pytest.mark.long
 def test_a_blend_goes_round_the_way_point_within_its_radius_and_without_a_stop() -> None:
     nearest, slowest, cycles = _corner(0.0)
     assert nearest < 1e-9
