@@ -7,7 +7,8 @@ A simulated arm stands under guard, with one virtual skin of 1 kHz, and with eig
 two bare programs:
 
     bare loop     poll, read and send: it reads frames at 1 kHz and states at 500 Hz, as the guard with one skin does
-    bare ur_rtde  one that opens the same connections as the driver process, and then only keeps them
+    bare ur_rtde  one that opens the same connections as the driver process, and then only keeps them; with the time
+                  slices of ours, because the wheel looks for bytes as often as it is let run
 
 All figures are shares of a core, from the kernel's count of the time that the threads of a process have run. The pure
 and the compiled build take turns.
@@ -52,6 +53,8 @@ xyz_mm = [0, 0, {along}]
 BARE_RTDE = """
 import sys
 import rtde_control
+from coneskin.core.child_process import shorten_time_slice
+shorten_time_slice()
 control = rtde_control.RTDEControlInterface(sys.argv[1])
 print("ready", flush=True)
 sys.stdin.readline()

@@ -1,6 +1,6 @@
 """Time from a frame at the port to a stop on the wire, stage by stage, beside the baseline of this machine.
 
-    python -m bench loop [--touches 500] [--rate-hz 1000]
+    python -m bench loop [--touches 150] [--rate-hz 1000]
 
 A process writes frames to a pseudo-terminal and states to a socket, at a steady pace, and notes when. In turns of some
 seconds each they are read by
@@ -80,7 +80,7 @@ TOUCHES = 25  # in a turn
 def main() -> int:
     """Run the turns and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--touches", type=int, default=500)
+    parser.add_argument("--touches", type=int, default=150)
     parser.add_argument("--rate-hz", type=float, default=1000.0)
     args = parser.parse_args()
     print(head())
