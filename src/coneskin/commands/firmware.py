@@ -108,12 +108,9 @@ def _flash(sketch: Path, circuit: BoardCircuit, port: str) -> None:
             program = _compile_for_uno(sketch, Path(folder))
             words = ["avrdude", "-q", "-p", "atmega328p", "-c", "arduino", "-P", port, "-D"]
             words += ["-U", f"flash:w:{program}:e"]
-            said: list[str] = []
-            for baud in _BOOTLOADER_BAUDS:
-                if not (why := _said([*words, "-b", baud])):
-                    return
-                said.append(why)
-            raise SkinConnectionError(f"avrdude cannot write to the board at {port}: {said[0]}")
+            tries = (_said([*words, "-b", baud]) for baud in _BOOTLOADER_BAUDS)
+            if (said := next(tries)) and next(tries):
+                raise SkinConnectionError(f"avrdude cannot write to the board at {port}: {said}")
     elif shutil.which("arduino-cli"):
         _run(["arduino-cli", "compile", "--upload", "--fqbn", target, "--port", port, str(sketch)])
     else:
