@@ -4,6 +4,7 @@ import itertools
 import math
 import statistics
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -65,6 +66,19 @@ def test_noise_has_the_width_that_was_asked_for():
     counts = [f.touch_supply for f in frames_of(VirtualSkin(SENSOR, duration=1.5, imperfections=Imperfections(3.0)))]
     # 3 counts and rounding (1/12): 3.014; the estimate of 1500 frames is good to 1.8 %
     assert statistics.stdev(counts) == pytest.approx(math.hypot(3.0, math.sqrt(1 / 12)), rel=0.04)
+
+
+def test_mains_swing_on_the_guides_and_on_nothing_else():
+    press, still = ScriptedTouch(0.0, 1.0, 0.1, 2.0), Imperfections(noise_counts=0.0)
+    humming = replace(still, mains_volts=0.1)
+    quiet, loud = (
+        frames_of(VirtualSkin(SENSOR, [press], duration=0.3, imperfections=each)) for each in (still, humming)
+    )
+    swing = [b.radial_c - a.radial_c for a, b in zip(quiet, loud, strict=True)][-40:]
+    most = SENSOR.electronics.count_volts(0.1)
+    assert max(swing) == pytest.approx(most, abs=1.0)
+    assert min(swing) == pytest.approx(-most, abs=1.0)
+    assert [frame.touch_supply for frame in quiet] == [frame.touch_supply for frame in loud]
 
 
 def test_force_rises_within_its_time():
