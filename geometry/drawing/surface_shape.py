@@ -92,7 +92,7 @@ def draw_shape(frustum: Frustum, shape: SurfaceShape, closed: bool = True) -> Ou
     end = kept[0].start if closed else kept[-1].end
     outline = Outline.from_segments([*joined, PathSegment(kept[-1].start, end, kept[-1].bulge)], closed)
     if closed and outline.area < 0.0:
-        return _reversed(outline)
+        return Outline.from_segments([PathSegment(s.end, s.start, -s.bulge) for s in outline.segments()][::-1])
     return outline
 
 
@@ -135,7 +135,3 @@ def _rectangle(frustum: Frustum, tab: ShapeTab) -> tuple[tuple[ShapeCorner, Shap
         dx, dy = out * cosine, -out * sine
     (ax, ay), (bx, by) = (drawing_point(frustum, foot.u, foot.phi) for foot in feet)
     return feet, ((ax + dx, ay + dy), (bx + dx, by + dy))
-
-
-def _reversed(outline: Outline) -> Outline:
-    return Outline.from_segments([PathSegment(s.end, s.start, -s.bulge) for s in outline.segments()][::-1])

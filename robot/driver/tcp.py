@@ -6,8 +6,7 @@ A maker's driver says where the payloads end, which ports take stops, and what t
 from __future__ import annotations
 
 import socket
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import ClassVar, Self
 
@@ -25,7 +24,6 @@ class TcpReader:
     Args:
         host: the controller.
         timeout: how long connecting and each reply may take [s].
-        clock: monotonic seconds.
 
     Raises:
         RobotConnectionError: on entering, where the controller cannot be reached.
@@ -35,10 +33,8 @@ class TcpReader:
     port: ClassVar[int]  #: TCP port of the controller
     advice: ClassVar[str] = "check the address (arm.host), and that the controller is on"  #: where it is not reached
 
-    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
-        self.host = host
-        self._timeout = timeout
-        self._clock = clock
+    def __init__(self, host: str, timeout: float = 2.0) -> None:
+        self.host, self._timeout = host, timeout
         self._sock: socket.socket | None = None
         self._rest = b""
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from enum import IntEnum
 from typing import Any, Self
 
@@ -39,15 +38,14 @@ class RtdeVariableReader:
     Args:
         host: the controller.
         timeout: how long connecting, each reply and a fresh value may take [s].
-        clock: monotonic seconds.
 
     Raises:
         RobotConnectionError: on entering, where the controller cannot be reached.
         RobotTimeout: on entering, where it does not answer.
     """
 
-    def __init__(self, host: str, timeout: float = 2.0, clock: Callable[[], float] = time.monotonic) -> None:
-        self._host, self._timeout, self._clock = host, timeout, clock
+    def __init__(self, host: str, timeout: float = 2.0) -> None:
+        self._host, self._timeout = host, timeout
         self._asking = threading.Lock()  # one thread opens the connection anew
         self._news = threading.Condition()
         self._connection: RtdeConnection | None = None
@@ -107,7 +105,7 @@ class RtdeVariableReader:
         return dict(zip(recipe.names, recipe.unpack(payload), strict=True))
 
     def _open(self, names: tuple[str, ...]) -> None:
-        connection = RtdeConnection(self._host, self._timeout, self._clock)
+        connection = RtdeConnection(self._host, self._timeout)
         connection.__enter__()
         try:
             self._recipe = connection.ask_outputs(names)
@@ -136,7 +134,7 @@ class RtdeVariableReader:
                 wait_readable([connection], _POLL_PERIOD)
                 if payloads := connection.read():
                     with self._news:
-                        self._newest = (self._clock(), recipe, payloads[-1])
+                        self._newest = (time.monotonic(), recipe, payloads[-1])
                         self._news.notify_all()
         except ConeSkinError as exc:
             with self._news:
@@ -145,13 +143,13 @@ class RtdeVariableReader:
 
     def _fresh(self) -> tuple[rtde.Recipe, bytes]:
         """Return the newest payload, which is not old; wait for it where need be."""
-        end = self._clock() + self._timeout
+        end = time.monotonic() + self._timeout
         with self._news:
-            while self._newest is None or self._clock() - self._newest[0] > _FRESH_TIME:
+            while self._newest is None or time.monotonic() - self._newest[0] > _FRESH_TIME:
                 if self._error is not None:
                     self._thread = None  # the next question opens the connection anew
                     raise RobotConnectionError(f"the state of the arm cannot be read: {self._error}") from self._error
-                left = end - self._clock()
+                left = end - time.monotonic()
                 if left <= 0.0:
                     raise RobotTimeout(f"the controller {self._host} has sent no state for {self._timeout:g} s")
                 self._news.wait(left)

@@ -8,6 +8,7 @@ the controller freezes. The reader is one socket in the guard's own loop, and ea
 from __future__ import annotations
 
 import struct
+import time
 from collections.abc import Sequence
 from typing import Self
 
@@ -93,8 +94,8 @@ class RtdeConnection(TcpReader):
             RobotTimeout: none came.
             RobotConnectionError: the controller is gone.
         """
-        end = self._clock() + timeout
-        while (left := end - self._clock()) > 0.0:
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0.0:
             if payloads := self.read():
                 return payloads[-1]
             wait_readable([self], left)
@@ -122,12 +123,12 @@ class RtdeConnection(TcpReader):
     def _ask(self, request: bytes, kind: rtde.PacketKind) -> bytes:
         """Send a request and wait for the reply of its kind; close the connection where that fails."""
         assert self._sock is not None
-        end = self._clock() + self._timeout
+        end = time.monotonic() + self._timeout
         try:
             self._sock.sendall(request)
             reply: bytes | None = None
             while reply is None:
-                if self._clock() >= end:
+                if time.monotonic() >= end:
                     raise TimeoutError
                 data = self._sock.recv(1 << 16)
                 if not data:
@@ -160,7 +161,6 @@ class StateReader(RtdeConnection):
     Args:
         host: the controller.
         timeout: how long connecting and each reply may take [s].
-        clock: monotonic seconds.
 
     Raises:
         RobotConnectionError: on entering, where the controller cannot be reached or refuses.
@@ -180,7 +180,7 @@ class StateReader(RtdeConnection):
             RobotTimeout: none came within the timeout [s].
             RobotConnectionError: the controller is gone.
         """
-        return rtde.decode_state(self._clock(), self.wait_data(timeout))
+        return rtde.decode_state(time.monotonic(), self.wait_data(timeout))
 
     def _ask_for(self) -> None:
         """Ask for the variables before the data flows."""

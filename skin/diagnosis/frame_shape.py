@@ -141,7 +141,7 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
         return None
     share = f"{100.0 * (1.0 - found.covered):.1f} % of the bytes are no frames"
     for cause, words, undo in (
-        (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", _undo_newlines),
+        (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", lambda data: data.replace(b"\r\n", b"\n")),
         (Cause.SLIP, "the frames are wrapped in SLIP", undo_slip),
     ):
         frames, covered = count_frames(undo(data))
@@ -169,10 +169,6 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
     if printable_share(between) > 0.9:
         return Cause.TEXT.found(f"text stands between the frames: {first_line(between)!r}")
     return Cause.DAMAGED.found(f"{share}, such as {short_hex(max(found.gaps, key=len))}")
-
-
-def _undo_newlines(data: bytes) -> bytes:
-    return data.replace(b"\r\n", b"\n")
 
 
 def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:

@@ -40,7 +40,6 @@ def play(
     write: Callable[[bytes], bool],
     *,
     wait: Callable[[float], bool],
-    clock: Callable[[], float] = time.monotonic,
     pacing: Pacing | None = None,
 ) -> None:
     """Write a virtual skin's bytes when they are due, until its line is gone or the caller asks to stop.
@@ -51,18 +50,17 @@ def play(
         skin: what to play.
         write: takes the bytes; False if they were lost.
         wait: lets so many seconds pass; True if the playing shall stop.
-        clock: the time [s].
         pacing: is filled in while playing.
     """
     pacing = pacing or Pacing()
-    start = clock()
+    start = time.monotonic()
     try:
         for due, data in skin.packets():
-            left = start + due - clock()
+            left = start + due - time.monotonic()
             if wait(max(left, 0.0)):
                 return
             if data:
-                pacing.worst_late = max(pacing.worst_late, clock() - start - due)
+                pacing.worst_late = max(pacing.worst_late, time.monotonic() - start - due)
                 pacing.packets += 1
                 if not write(data):
                     pacing.overruns += 1

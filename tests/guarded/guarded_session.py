@@ -37,7 +37,7 @@ _HELD_UP = ("too old to move away by", "too late to move away by", "the guard ha
 _HELD_UP += ("no retreat: a point of the arm has moved", "the time of 2.0 s is over")
 #: ... and where the bytes of a skin that this computer simulates came later than its patient scene allows
 _HELD_UP += ("ms late, skin_late_ms = 1000; a busy computer needs more",)
-_TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
+TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
 
 
 def scene_text(host, changes=None, control="internal"):
@@ -121,7 +121,7 @@ def until_undisturbed(attempt):
         said = " ".join(str(getattr(event, "details", event)) for event in events)
         if not any(words in said for words in _HELD_UP):
             return events
-        if time.monotonic() > end and os.getloadavg()[0] > _TOO_BUSY:
+        if time.monotonic() > end and os.getloadavg()[0] > TOO_BUSY:
             pytest.skip("no verdict: this computer is too busy for any arm to be moved away")
         assert time.monotonic() < end, "no arm is moved away: " + said
 

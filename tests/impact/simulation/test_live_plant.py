@@ -9,8 +9,10 @@ import struct
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,7 @@ from coneskin.runs.what_if.what_if import judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.session.session import guard
-from tests.guarded.guarded_session import until
+from tests.guarded.guarded_session import TOO_BUSY, until
 from tests.support.scenes import forearm_scene, start_with
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the virtual skin needs a pseudo-terminal")
@@ -49,7 +51,7 @@ _PATIENT = (
 
 
 def scene_at(host: str) -> Scene:
-    text = forearm_scene(host, limits=_PATIENT).replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 500')
+    text = forearm_scene(host, limits=_PATIENT).replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 200')
     text = text.replace("[arm]", "[arm]\nwatchdog_hz = 1")
     return parse_scene(text + _HAND)
 
@@ -68,33 +70,59 @@ def opened() -> Iterator[Live]:
         yield scene, plant, controller
 
 
-@pytest.fixture
-def live() -> Iterator[Live]:
-    with opened() as parts:
-        yield parts
+def until_undisturbed(attempt: Callable[[Live], bool], opener: Callable[[], AbstractContextManager[Live]]) -> None:
+    """Make attempts, each with a physics of its own, until one is not held up by this computer, and says so.
+
+    Skips the test where none is not, and far more processes want to run than there are cores.
+    """
+    for _ in range(5):
+        with opener() as live:
+            try:
+                if attempt(live):
+                    return
+            except ConeSkinError:
+                if not held_up(live):
+                    raise
+    if os.getloadavg()[0] > TOO_BUSY:
+        pytest.skip("no verdict: this computer is too busy for any physics in real time")
+    pytest.fail("this computer has held the physics up five times of five")
 
 
-def meet_the_hand(live: Live, recording: Path) -> tuple[list[GuardEvent], dict[str, Any]] | None:
-    """Move into the hand; the events and the state at rest, or None where this computer held up the physics itself."""
-    scene, plant, controller = live
-    try:
-        with guard(scene, recording=recording, pressed_by=plant.skin) as session:
-            with pytest.raises(Collision):
-                session.arm.move_j(GOAL, speed=1.0, acceleration=8.0)
-            return session.events, controller.wait_for_standstill()
-    except ConeSkinError:
-        if "behind real time" in controller.state()["plant_lost"]:
-            return None
-        raise
+def once_it_moves(controller: SimulatedController, act: Callable[[], object]) -> threading.Thread:
+    """Act from a thread once the arm moves, or has lost its physics; the thread."""
+
+    def moves() -> bool:
+        state = controller.state()
+        return max(map(abs, state["qd"])) > 0.1 or state["plant_lost"] != ""
+
+    def run() -> None:
+        until(moves)
+        act()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return thread
+
+
+def held_up(live: Live) -> bool:
+    """Tell whether the controller has given the physics up because it did not keep up."""
+    return "behind real time" in live[2].state()["plant_lost"]
 
 
 def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(tmp_path: Path) -> None:
-    for attempt in range(5):
-        with opened() as live:
-            if (found := meet_the_hand(live, tmp_path / f"{attempt}.rec")) is not None:
-                judge_the_stop(live, tmp_path / f"{attempt}.rec", *found)
-                return
-    pytest.fail("this computer has held the physics up five times of five")
+    recordings = (tmp_path / f"{number}.rec" for number in count())
+
+    def attempt(live: Live) -> bool:
+        scene, plant, controller = live
+        recording = next(recordings)
+        with guard(scene, recording=recording, pressed_by=plant.skin) as session:
+            with pytest.raises(Collision):
+                session.arm.move_j(GOAL, speed=1.0, acceleration=8.0)
+            rest = controller.wait_for_standstill()
+        judge_the_stop(live, recording, session.events, rest)
+        return True
+
+    until_undisturbed(attempt, opened)
 
 
 @pytest.mark.long
@@ -136,19 +164,24 @@ def judge_the_stop(live: Live, recording: Path, events: list[GuardEvent], rest: 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("harm", "said"), [("kill", "has ended"), ("freeze", "behind real time")])
-def test_physics_that_dies_or_falls_behind_is_said_and_stops_everything(live, harm: str, said: str) -> None:  # type: ignore[no-untyped-def]
-    scene, plant, controller = live
-    with guard(scene, pressed_by=plant.skin) as session:
-        timer = threading.Timer(0.1, getattr(plant, harm))
-        timer.start()
-        with pytest.raises(RobotRefused, match=r"safety system|fault|NOT confirmed"):
-            session.arm.move_j(GOAL, speed=0.2, acceleration=1.0)
-        timer.join()
-        assert said in controller.state()["plant_lost"]
-        assert controller.state()["safety"] == "FAULT"
-        assert not any(event.name == EventName.STANDSTILL for event in session.events)  # nobody has measured one
-        with pytest.raises(RobotRefused):
-            session.reset()
+def test_physics_that_dies_or_falls_behind_is_said_and_stops_everything(harm: str, said: str) -> None:
+    def attempt(live: Live) -> bool:
+        scene, plant, controller = live
+        with guard(scene, pressed_by=plant.skin) as session:
+            harming = once_it_moves(controller, getattr(plant, harm))
+            with pytest.raises(RobotRefused, match=r"safety system|fault|NOT confirmed"):
+                session.arm.move_j(GOAL, speed=0.2, acceleration=1.0)
+            harming.join()
+            if held_up(live) and harm != "freeze":
+                return False
+            assert said in controller.state()["plant_lost"]
+            assert controller.state()["safety"] == "FAULT"
+            assert not any(event.name == EventName.STANDSTILL for event in session.events)  # nobody has measured one
+            with pytest.raises(RobotRefused):
+                session.reset()
+        return True
+
+    until_undisturbed(attempt, opened)
 
 
 class Relay(threading.Thread):
@@ -190,20 +223,29 @@ class Relay(threading.Thread):
     ],
 )
 def test_a_guarded_arm_whose_physics_talks_nonsense_is_in_a_fault_without_power(answer: bytes, said: str) -> None:
-    host = free_host()
-    scene = scene_at(host)
-    with LivePlant(scene, START) as plant:
-        relay = Relay(plant.controller)
-        relay.start()
-        with (
-            SimulatedController("UR5e", host, START, plant=relay.controller) as controller,
-            guard(scene, pressed_by=plant.skin) as session,
-        ):
-            timer = threading.Timer(0.1, relay.answer, [answer])
-            timer.start()
+    relays: list[Relay] = []
+
+    @contextmanager
+    def relayed() -> Iterator[Live]:
+        host = free_host()
+        scene = scene_at(host)
+        with LivePlant(scene, START) as plant:
+            relays.append(relay := Relay(plant.controller))
+            relay.start()
+            with SimulatedController("UR5e", host, START, plant=relay.controller) as controller:
+                yield scene, plant, controller
+            relay.join(60.0)
+            assert not relay.is_alive()
+
+    def attempt(live: Live) -> bool:
+        scene, plant, controller = live
+        with guard(scene, pressed_by=plant.skin) as session:
+            harming = once_it_moves(controller, partial(relays[-1].answer, answer))
             with pytest.raises(RobotRefused, match=r"safety system|fault|NOT confirmed"):
                 session.arm.move_j(GOAL, speed=0.2, acceleration=1.0)
-            timer.join()
+            harming.join()
+            if held_up(live):
+                return False
             rest = controller.state()
             assert said in rest["plant_lost"]
             assert (rest["safety"], rest["robot_mode"], rest["runtime"]) == ("FAULT", "POWER_OFF", "STOPPED")
@@ -214,8 +256,9 @@ def test_a_guarded_arm_whose_physics_talks_nonsense_is_in_a_fault_without_power(
             later = controller.state()
             assert later["q"] == rest["q"]
             assert math.isclose(later["q"][0], START[0], abs_tol=0.3)  # far from its goal
-        relay.join(10.0)
-        assert not relay.is_alive()
+        return True
+
+    until_undisturbed(attempt, relayed)
 
 
 def test_a_scene_without_an_arm_has_no_physics() -> None:

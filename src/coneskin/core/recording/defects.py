@@ -138,11 +138,6 @@ class Defect:
 _END_BIT = 1 << END
 
 
-def _kinds_of(mask: int) -> frozenset[int]:
-    """Return the kinds of block that bits stand for; what is the file's own is no kind."""
-    return frozenset(kind for kind in range(1, 63) if mask >> kind & 1)
-
-
 def find_defects(
     extents: Sequence[Extent], damages: Sequence[tuple[Path, int, Damage]], run: int
 ) -> tuple[tuple[Extent, ...], tuple[Defect, ...]]:
@@ -235,6 +230,6 @@ class _Hole:
     def defect(self, kind: DefectKind) -> Defect:
         chunks = None if self.following is None else self.following - self.first
         all_known = self.known == chunks if chunks is not None else self.known > 0
-        kinds = _kinds_of(self.kinds) if all_known else None
+        kinds = frozenset(kind for kind in range(1, 63) if self.kinds >> kind & 1) if all_known else None  # bits
         note = "" if self.path is None else self.path.name
         return Defect(kind, self.since, self.until, self.offset, self.size, chunks, self.blocks, kinds, note)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit
+from coneskin.core.child_process import inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError, MissingExtra
 from coneskin.core.text import finite
 
@@ -52,6 +52,7 @@ def main(arguments: list[str]) -> int:
     except (ConeSkinError, PlantLost) as exc:
         program.send(encode_json({"refused": str(exc), "missing": isinstance(exc, MissingExtra)}))
         return 1
+    shorten_time_slice()
     with contextlib.suppress(OSError):
         os.nice(_PROCESS_NICENESS)  # allowed for root, and where the user's limits say so: nature waits for no process
     program.send(encode_json({"ready": True}))
