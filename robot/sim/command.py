@@ -174,29 +174,22 @@ def _announce(args: argparse.Namespace, controller: Controller, server: Server) 
         "pid": os.getpid(),
     }
     if not server.local:
-        print(
-            f"coneskin sim-ur: WARNING: it listens on {args.host}, beyond this computer. Whoever can reach it may run "
-            "programs in it: it asks for no password, as a real controller does not. It moves no real arm.",
-            file=sys.stderr,
-            flush=True,
+        _warn(
+            f"it listens on {args.host}, beyond this computer. Whoever can reach it may run programs in it: it asks "
+            "for no password, as a real controller does not. It moves no real arm."
         )
     host, port = controller.options.external_control
     if not is_loopback(host):
-        print(
-            f"coneskin sim-ur: WARNING: a program with the node External Control takes its script from {host} port "
-            f"{port}, beyond this computer.",
-            file=sys.stderr,
-            flush=True,
+        _warn(
+            f"a program with the node External Control takes its script from {host} port {port}, beyond this computer."
         )
-    if args.json:
-        print(json.dumps(facts), flush=True)
-    else:
-        print(
-            f"simulated {facts['model']} (PolyScope {args.version}) ready on {args.host}: "
-            + ", ".join(f"{name} {port}" for name, port in controller.options.services.items())
-            + "; Ctrl-C stops it",
-            flush=True,
-        )
+    ports = ", ".join(f"{name} {port}" for name, port in controller.options.services.items())
+    line = f"simulated {facts['model']} (PolyScope {args.version}) ready on {args.host}: {ports}; Ctrl-C stops it"
+    print(json.dumps(facts) if args.json else line, flush=True)
+
+
+def _warn(text: str) -> None:
+    print(f"coneskin sim-ur: WARNING: {text}", file=sys.stderr, flush=True)
 
 
 def _time(option: str, value: float, most: int) -> float:

@@ -137,7 +137,7 @@ def main(arguments: list[str]) -> int:
             if not second:
                 connections = stack.enter_context(driver.stop_connections(host))
                 reader = stack.enter_context(driver.state_reader(host))
-            held = held_braking(settings["model"], settings["payload"], settings["payload_xyz"])
+            held = held_braking(*settings["held_braking"])
             hold = StandstillHold(driver, connections, limits, settings["deceleration"], reader, held)
             stack.callback(hold.close)
             lifeline.hold()
