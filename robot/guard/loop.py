@@ -177,8 +177,9 @@ class GuardLoop:
         self._blind = ports.source is not None and ports.source.fileno() is None
         self._watched: dict[int, HasFileno] = {}
         self._bits: dict[int, int] = {}  # of these descriptors
-        self._epoll: Any = select.epoll() if hasattr(select, "epoll") else None
-        self._skin_epoll: Any = select.epoll() if hasattr(select, "epoll") else None
+        self._epolls: list[Any] = (
+            [select.epoll(), select.epoll()] if hasattr(select, "epoll") else []
+        )  # the skin's last
         self._look_at = 0.0  # when is looked at what is no skin
         self._quit = False
         self._fed = False  # anything, in this step
@@ -232,32 +233,29 @@ class GuardLoop:
         if item is not None:
             number = item.fileno()
             self._watched[number], self._bits[number] = item, bit
-            if self._epoll is not None:
-                (self._skin_epoll if bit == _SKIN else self._epoll).register(number, select.EPOLLIN)
+            if self._epolls:
+                self._epolls[bit == _SKIN].register(number, select.EPOLLIN)
 
     def _forget(self, item: object) -> None:
         for number in [number for number, watched in self._watched.items() if watched is item]:
             del self._watched[number], self._bits[number]
-            for epoll in filter(None, (self._skin_epoll, self._epoll)):
+            for epoll in self._epolls:
                 with suppress(OSError):  # it is closed, or in the other one
                     epoll.unregister(number)
 
     def _wait(self, timeout: float) -> int:
         """Wait for the skin, or without epoll for anything, or for the timeout [s]; return the bits of what came."""
-        if self._epoll is not None:
-            return _SKIN if self._skin_epoll.poll(0.0 if self._blind else timeout, 1) else 0
+        if self._epolls:
+            return _SKIN if self._epolls[1].poll(0.0 if self._blind else timeout, 1) else 0
         return self._bits_of(item.fileno() for item in wait_readable(list(self._watched.values()), timeout))
 
     def _bits_of(self, numbers: Iterable[int]) -> int:
-        ready = 0
-        for number in numbers:
-            ready |= self._bits[number]
-        return ready
+        return sum({self._bits[number] for number in numbers})
 
     def _close(self) -> None:
         if self._reopening is not None:
             self._reopening.stop()
-        for epoll in filter(None, (self._skin_epoll, self._epoll)):
+        for epoll in self._epolls:
             epoll.close()
 
     def poll(self, timeout: float) -> None:
@@ -267,9 +265,9 @@ class GuardLoop:
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
         if now - before > _OVERRUN_TIME or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)
-        if self._epoll is not None and (not ready or now >= self._look_at):
+        if self._epolls and (not ready or now >= self._look_at):
             self._look_at = now + _LOOK_PERIOD
-            ready |= self._bits_of(number for number, _ in self._epoll.poll(0, _MAX_READY))
+            ready |= self._bits_of(number for number, _ in self._epolls[0].poll(0, _MAX_READY))
         if ready & _READER and self._core.phase.stopping:  # states that wait may show that the stop under way works
             self._read(ports.reader, "controller", BlockKind.ARM)
             ready &= ~_READER

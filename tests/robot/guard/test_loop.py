@@ -142,12 +142,13 @@ def test_a_skin_without_a_descriptor_is_waited_for_once_and_no_more_when_it_is_g
 
     core, skin = Core(), SimpleNamespace(fileno=lambda: None, read=read)
     loop = GuardLoop(core, GuardPorts(ends[0], skin))
-    loop._epoll = loop._skin_epoll = Mock(**{"poll.return_value": []})
+    skins = Mock(**{"poll.return_value": []})
+    loop._epolls = [skins, skins]
     loop._wait(0.002)
     loop._read_skin(skin)
     loop._wait(0.002)
     assert core.taken == [BlockKind.LOST]
-    assert [each.args[0] for each in loop._skin_epoll.poll.mock_calls] == [0.0, 0.002]
+    assert [each.args[0] for each in skins.poll.mock_calls] == [0.0, 0.002]
 
 
 def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
