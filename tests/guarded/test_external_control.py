@@ -211,8 +211,7 @@ def test_it_gives_way_to_a_push(controller, run):
 
 @pytest.mark.promise("P43")
 @pytest.mark.long
-@pytest.mark.parametrize("gone", [("guard",), ("guard", "watchdog")])
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize(("gone", "number"), [(("guard",), signal.SIGKILL), (("guard", "watchdog"), signal.SIGSTOP)])
 def test_without_its_guard_a_retreat_ends(controller, run, gone, number):
     far = "distance_mm = 400\ntime_budget_s = 30\nspeed_mm_s = 50"
 

@@ -50,8 +50,7 @@ end
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("control", ["internal", "external"])
-@pytest.mark.parametrize("program", ["", MOVES, SERVO])
+@pytest.mark.parametrize(("control", "program"), [("internal", ""), ("internal", MOVES), ("external", SERVO)])
 def test_a_guard_does_not_start_on_a_controller_in_local_control(control, program):
     """Whatever moves the arm, and a servoj without the heartbeat's lines, which nothing would stop there."""
     with SimulatedController(model="UR5e", host=free_host(), start_q=START) as controller:

@@ -87,8 +87,8 @@ def assert_the_program_hears_that_it_stands(session):
 @pytest.mark.parametrize(
     ("code", "wait"),
     [
-        *[pytest.param(LOOP, wait, id=f"loop {wait}", marks=WHEEL) for wait in WAITS],
-        *[pytest.param(RESEND, wait, id=f"resend {wait}") for wait in WAITS[1:]],  # one needs 10 ms to start at all
+        *[pytest.param(LOOP, wait, id=f"loop {wait}", marks=WHEEL) for wait in WAITS[::2]],
+        *[pytest.param(RESEND, wait, id=f"resend {wait}") for wait in WAITS[1::2]],  # one needs 10 ms to start at all
     ],
 )
 def test_a_program_that_starts_again_at_once_is_stopped_for_good(controller, run, code, wait):

@@ -55,8 +55,7 @@ def start_again(controller):
 
 @pytest.mark.promise("P46")
 @pytest.mark.long
-@pytest.mark.parametrize("gone", [("guard",), ("watchdog", "guard")])
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize(("gone", "number"), [(("guard",), signal.SIGSTOP), (("watchdog", "guard"), signal.SIGKILL)])
 def test_a_program_that_starts_again_without_a_guard_is_stopped_again(controller, gone, number):
     with guard(external(controller)) as session:
         send(controller.host, 30002, RAW)
