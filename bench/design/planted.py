@@ -123,7 +123,7 @@ def bodies() -> Iterator[Body]:
         ((0.0, 0.05), (0.1, 0.05)),
         ((0.101, 0.04), (0.2, 0.035)),
     )
-    for microns in (50, 200):
+    for microns in (50, 200, 500, 1000):
         yield body(f"cone, noise {microns} um", turned(list(cone)), cone, noise=microns * 1e-6)
     yield body("tube with holes", holed(turned(list(tube), 360, 160)), tube)
     for facets in (36, 18):
