@@ -44,15 +44,24 @@ GROUPS = {
 
 def _scene_tables() -> dict[str, tuple[Any, ...]]:
     """Return the keys of every table of a scene by its heading, in the order of the page, each with its default."""
+    from coneskin.core.keys import Key, with_meanings
     from coneskin.robot.reaction.types import Reaction
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.scene.tables import keys
-    from coneskin.scene.tables.sensor_keys import FILE_KEYS, SENSOR_KEYS
+    from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
 
+    files = with_meanings(  # they are taken out of a table before its keys are checked
+        """
+        file: a file with more of these keys
+        calibration: a calibration file, or the folder of such files. The newest one of this device and sensor applies
+        """,
+        Key("file", str, None),
+        Key("calibration", str, None),
+    )
     return {
         "[arm]": keys.ARM_KEYS,
         "[[link]]": keys.LINK_KEYS,
-        "[[link.sensor]]": (*FILE_KEYS, *SENSOR_KEYS),
+        "[[link.sensor]]": (*files, *SENSOR_KEYS),
         "[source]": keys.source_keys(),
         "[[source.touch]]": keys.TOUCH_KEYS,
         "[reaction]": _with_defaults(keys.REACTION_KEYS, Reaction),

@@ -154,12 +154,3 @@ SENSOR_KEYS = (
     *(*CONE_KEYS, *_BEND_KEYS, *_PLACE_KEYS, *_WIRE_KEYS, *_POLARITY_KEYS),
     *(*_ELECTRONICS_KEYS, *_SHEET_KEYS, *_THRESHOLD_KEYS, *CALIBRATION_KEYS),
 )
-#: that a scene may have beside those of the sensor
-FILE_KEYS = with_meanings(
-    """
-    file: a file with more of these keys
-    calibration: a calibration file, or the folder of such files. The newest one of this device and sensor applies
-    """,
-    Key("file", str, None),
-    Key("calibration", str, None),
-)
