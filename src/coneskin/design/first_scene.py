@@ -15,6 +15,7 @@ from coneskin.core.files import read_file
 from coneskin.core.text import read_json
 from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
 from coneskin.robot.arm.models import arm_model
+from coneskin.scene.reader import TUBE_LENGTHS
 from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.firmware.board_circuit import toml_lines
 
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
 _MAX_BYTES = 4 << 20  # of design.json
-_TUBE_AXES = {"upper_arm": 1, "forearm": 2}  # link -> index of the DH length along which its mesh's z axis runs
 _FILE_HEAD = """\
 # Written by `coneskin init`; every key is described in docs/look-up/scene.md.
 """
@@ -235,12 +235,12 @@ def _padding(thickness: float) -> str:
 
 def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
     """Return the pose of a sensor that was designed from dimensions: the middle of the tube, until it is measured."""
-    if link not in _TUBE_AXES:
+    if link not in TUBE_LENGTHS:
         raise GeometryError(
             f"the design was made from dimensions, so where it is on the {link} is not known; design it from the "
-            f"link's mesh, or choose --link {' or '.join(_TUBE_AXES)}"
+            f"link's mesh, or choose --link {' or '.join(TUBE_LENGTHS)}"
         )
-    start = 0.5e3 * (abs(arm_model(model).a[_TUBE_AXES[link]]) - cone.height)
+    start = 0.5e3 * (abs(arm_model(model).a[TUBE_LENGTHS[link]]) - cone.height)
     return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: end 1 along the link from the joint; the design knew no link"
 
 
