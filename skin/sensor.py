@@ -144,19 +144,9 @@ class Sensor:
         """Resistance of the untouched lower sheet from C to D [ohm]."""
         return sheet_resistances(self.frustum, self.upper_sheet_ohms, self.lower_sheet_ohms)[1]
 
-    def sheet_ohms(self, radial: float, angular: float) -> tuple[float, float]:
-        """Return what the untouched sheets have per square, upper and lower [ohm], with leads as they are told.
-
-        Args:
-            radial: drive current of the radial phase over the supply, both in counts.
-            angular: likewise of the angular phase.
-        """
-        parts, (a, b, c, d) = self.electronics, self.electronics.lead_ohms
-        ohms = parts.adc_volts / parts.current_full_scale
-        return (
-            (ohms / radial - a - b) * self.upper_sheet_ohms / self.radial_ohms,
-            (ohms / angular - c - d) * self.lower_sheet_ohms / self.angular_ohms,
-        )
+    def sheet_ohms(self, upper: float, lower: float) -> tuple[float, float]:
+        """Return what the upper and the lower sheet have per square [ohm] with such conductances [S]."""
+        return self.upper_sheet_ohms / (self.radial_ohms * upper), self.lower_sheet_ohms / (self.angular_ohms * lower)
 
     @property
     def radial_amperes(self) -> float:

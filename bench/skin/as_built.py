@@ -30,6 +30,7 @@ from bench.report import head, quantile, show
 from coneskin.commissioning.calibration.calibrate import calibration_marks
 from coneskin.commissioning.examination.skin_examination import SkinStatistics, examine_sensor
 from coneskin.skin.calibration import PlaceMap
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, IDEAL_SHEETS, SheetTolerance
 from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, draw_flaws
@@ -202,7 +203,8 @@ def measure(row: Row, skins: int) -> list[str]:
 
 def _doctor(sensor: Sensor, before: np.ndarray, now: np.ndarray) -> str:
     """Return what coneskin doctor names of a sensor that was calibrated with other untouched frames."""
-    ohms = sensor.sheet_ohms(*(float(np.mean(before[:, k] / before[:, 9])) for k in (5, 8)))
+    drawn = (float(np.mean(before[:, k] / before[:, 9])) for k in (5, 8))
+    ohms = sensor.sheet_ohms(*FrameInversion(sensor).untouched(*drawn))
     seen = SkinStatistics(0.0)
     for number, counts in enumerate(now.tolist()):
         seen.add(FRAME_PERIOD * number, packet(number, counts))

@@ -226,9 +226,9 @@ class Detector:
         return self._fault
 
     @property
-    def zero(self) -> int:
-        """Counts that are taken off each drive current: the bias and the offset of its amplifier."""
-        return self._zero.counts
+    def untouched_sheets(self) -> tuple[float, float]:
+        """Conductances of the upper and the lower sheet, as the untouched frames of late have them [S]."""
+        return self._inversion.untouched(self._currents.radial, self._currents.angular)
 
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.

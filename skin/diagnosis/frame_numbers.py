@@ -38,6 +38,7 @@ class FrameNumbers:
         missing: share of the sequence numbers that never came.
         period: device time from frame to frame, the middle one [s].
         held_up: for how long this computer has left frames unread, by those that it then read at once [s].
+        hidden: it was held up for so long that the ratio of the clocks may be 1.
     """
 
     rate: float
@@ -45,6 +46,7 @@ class FrameNumbers:
     missing: float
     period: float
     held_up: float
+    hidden: bool
 
 
 def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNumbers:
@@ -61,7 +63,9 @@ def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNum
     missing = sum(step - 1 for step in forward) / max(1, sum(forward))
     middle = median_high(ticks) * 1e-6 if ticks else 0.0
     ratio = _slope(ticks, times) if seconds >= _MIN_TIME else math.nan
-    return FrameNumbers(rate, ratio, missing, middle, _held_up(ticks, times))
+    held = _held_up(ticks, times)
+    hidden = held > 0.5 * seconds or abs(ratio - 1.0) * (seconds - held) <= held
+    return FrameNumbers(rate, ratio, missing, middle, held, hidden)
 
 
 def _held_up(ticks: Sequence[int], times: Sequence[float]) -> float:
@@ -88,21 +92,19 @@ def _clock_steps(frames: Sequence[Frame]) -> list[int]:
 def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
     """Return the speed of the device's clock over that of the host.
 
-    A frame comes late, never early. So a first line by least squares is turned until the quickest frames of the first
-    and of the last third are equally quick.
+    A frame comes late, never early, and a computer that is held up reads frames late for a while: they fall behind at
+    once, and stay or come back. Clocks of two speeds move apart all the time. So a first line by least squares is
+    turned to the middle one of the steps between the quickest frames of each part of the time.
     """
     clocks = list(itertools.accumulate(ticks, initial=0))
     count, slope = len(times), linear_regression(times, clocks).slope
-    third = count // 3
-    for _ in range(_LINE_TURNS if third else 0):
+    edges = [count * part // _TIME_PARTS for part in range(_TIME_PARTS + 1)]
+    for _ in range(_LINE_TURNS if count >= _TIME_PARTS * _MIN_FRAMES else 0):
         if not slope > 0.0:
             break
         lag = [time - clock / slope for time, clock in zip(times, clocks, strict=True)]
-        first = min(range(third), key=lag.__getitem__)
-        last = min(range(count - third, count), key=lag.__getitem__)
-        if times[last] <= times[first]:
-            break
-        slope = (clocks[last] - clocks[first]) / (times[last] - times[first])
+        quickest = itertools.pairwise(min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges))
+        slope = median_high((clocks[b] - clocks[a]) / max(times[b] - times[a], 1e-6) for a, b in quickest)
     return slope * 1e-6
 
 
@@ -114,7 +116,7 @@ def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors:
     return (
         _find_repeats(frames)
         or _find_sequence(frames, sensors)
-        or _find_clock(frames, times, numbers)
+        or _find_clock(frames, numbers)
         or _find_rate(frames, times, numbers)
     )
 
@@ -153,7 +155,7 @@ def _listing(frames: Sequence[Frame]) -> str:
     return ", ".join(str(frame.sequence) for frame in frames[-4:])
 
 
-def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:
+def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Finding | None:
     ticks = _clock_steps(frames)
     if not any(ticks):
         return Cause.CLOCK_STANDS.found(f"the device's clock stands at {frames[-1].clock_us}")
@@ -172,11 +174,9 @@ def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameN
         if 0.9 * factor < ratio < 1.1 * factor:
             return cause.found(f"the device's clock counts {unit}")
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
-        ratio = _steady_ratio(ticks, times, ratio)
-    off, held, total = abs(ratio - 1.0), numbers.held_up, times[-1] - times[0]
-    if off > _CLOCK_TOLERANCE and off * (total - held) <= held:
-        return Cause.HELD_UP.found(f"this computer held frames up for {1e3 * held:.0f} ms, which hides the clock")
-    if off > _CLOCK_TOLERANCE:
+        if numbers.hidden:
+            held = f"{1e3 * numbers.held_up:.0f} ms"
+            return Cause.HELD_UP.found(f"this computer held frames up for {held}, which hides the clock")
         return Cause.CLOCK_RATIO.found(f"the device's clock runs {ratio:.3f} times as fast as the computer's")
     period = 1e6 * numbers.period
     steps = zip(_sequence_steps(frames), ticks, strict=True)
@@ -188,27 +188,6 @@ def _find_clock(frames: Sequence[Frame], times: Sequence[float], numbers: FrameN
     if uneven > 0.1 * len(ticks):
         return Cause.CLOCK_JUMPS.found(f"the device's clock jumps in {uneven} of {len(ticks)} frames")
     return None
-
-
-def _steady_ratio(ticks: Sequence[int], times: Sequence[float], ratio: float) -> float:
-    """Return the ratio of the clocks without what a computer adds that was held up for a while.
-
-    Such a computer reads frames late: they fall behind at once, and stay or come back. Clocks of two speeds move apart
-    all the time: the quickest frames of most parts of the time fall behind by the same step.
-
-    Args:
-        ticks: steps of the device's clock [us].
-        times: when each frame came, host clock [s].
-        ratio: over the whole time; returned where most parts agree with it.
-    """
-    if len(times) < _TIME_PARTS * _MIN_FRAMES:
-        return ratio
-    clocks = itertools.accumulate(ticks, initial=0)
-    lag = [time - 1e-6 * clock for time, clock in zip(times, clocks, strict=True)]
-    edges = [len(lag) * part // _TIME_PARTS for part in range(_TIME_PARTS + 1)]
-    quickest = [min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges)]
-    middle = median_high((lag[b] - lag[a]) / max(times[b] - times[a], 1e-6) for a, b in itertools.pairwise(quickest))
-    return ratio if 0.5 < middle / (1.0 - ratio) < 2.0 else 1.0 - middle
 
 
 def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:

@@ -17,7 +17,6 @@ from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.timing import TimingLimits
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sources.kinds import is_simulated, open_source
-from coneskin.skin.wire import FrameDecoder
 
 from .touching import REQUESTS, Notice, Touching, TouchJudge
 
@@ -53,8 +52,6 @@ class SkinWatch:
         self._contradictions: dict[str, str] = {}
         self._source = source
         self._faults: list[str] = []
-        self._frames = FrameDecoder()
-        self._drawn: dict[tuple[int, int], tuple[int, float, float]] = {}
 
     def await_ready(self) -> None:
         """Wait until every sensor has sent a run of good untouched frames.
@@ -74,12 +71,10 @@ class SkinWatch:
     def untouched_ohms(self, sensor: Sensor) -> tuple[float, float]:
         """Return what the untouched sheets of a sensor have per square [ohm], upper and lower, as its currents say.
 
-        It is the mean since the watch was opened, up to now; the leads are taken to be those of the scene.
+        The leads are taken to be those of the scene.
         """
-        count, radial, angular = self._drawn[sensor.device_id, sensor.sensor_id]
-        zeros = {detector.sensor.name: detector.zero for detector in self._stream.detectors}
-        zero = zeros[sensor.name] / sensor.electronics.count_volts(sensor.electronics.supply_volts)
-        return sensor.sheet_ohms(radial / count - zero, angular / count - zero)
+        (found,) = (detector for detector in self._stream.detectors if detector.sensor.name == sensor.name)
+        return sensor.sheet_ohms(*found.untouched_sheets)
 
     def contradiction(self, sensor: str) -> str:
         """Return why a sensor's places must not be believed although they look right; empty where they may be.
@@ -111,18 +106,7 @@ class SkinWatch:
             if isinstance(event, SkinFault) and event.fault is Fault.GUIDES_DISAGREE:
                 self._contradictions[event.sensor] = event.message
         events += self._stream.silence(now, _FRAME_TIMEOUT)
-        if not self._stream.touched:
-            self._add_currents(data)
         self._faults += [event.message for event in events if isinstance(event, SkinFault)]
-
-    def _add_currents(self, data: bytes) -> None:
-        for frame in self._frames.feed(data):
-            number = frame.device, frame.sensor
-            count, radial, angular = self._drawn.get(number, (0, 0.0, 0.0))
-            if frame.radial_supply and frame.angular_supply:
-                radial += frame.radial_current / frame.radial_supply
-                angular += frame.angular_current / frame.angular_supply
-                self._drawn[number] = count + 1, radial, angular
 
 
 def check_touchable(scene: Scene, simulated: bool) -> None:

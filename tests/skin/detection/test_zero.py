@@ -47,7 +47,7 @@ def test_a_common_amplifiers_offset_moves_no_touch(sensor, millivolts):
     assert place.u == pytest.approx(0.130, abs=5e-4)
     assert place.phi == pytest.approx(math.radians(90.0), abs=5e-3)
     zero = sensor.electronics.current_zero / PARTS.current_full_scale + 1e-3 * millivolts * PER_VOLT
-    assert detector.zero == pytest.approx(zero * PARTS.full_count, abs=2.0)
+    assert detector._zero.counts == pytest.approx(zero * PARTS.full_count, abs=2.0)
 
 
 @pytest.mark.parametrize(("sensor", "millivolts"), [(PLAIN, 1.0), (PLAIN, 3.0), (BIASED, -1.5), (BIASED, 1.0)])
@@ -65,7 +65,7 @@ def test_one_below_zero_that_no_bias_shows_is_named_in_the_touch(millivolts):
 @pytest.mark.parametrize("noise", [0.0, 0.7, 3.0])
 def test_where_there_is_none_no_count_changes(noise):
     sensor_noise = play(PLAIN, 0.0, noise_counts=noise, model="ladder")[3]
-    assert sensor_noise.zero == 0
+    assert sensor_noise._zero.counts == 0
 
 
 def test_a_current_of_a_short_is_none():
@@ -125,7 +125,7 @@ def test_learned_currents_go_with_a_zero_that_creeps(rate):
     assert faults == []
     assert detector.ready
     counts = expected_counts(slender)
-    left = 51.0 + rate * 23.0 - detector.zero  # of the zero, in the currents of every frame
+    left = 51.0 + rate * 23.0 - detector._zero.counts  # of the zero, in the currents of every frame
     for learned, at in ((detector._currents.radial, 5), (detector._currents.angular, 8)):
         assert learned * counts[9] == pytest.approx(counts[at] - 51.0 + left, abs=1.0)
 
