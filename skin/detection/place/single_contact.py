@@ -167,7 +167,7 @@ def _split_noise(sensor: Sensor, aspect: float) -> float:
     return aspect * math.sqrt(2.0 * (own1 * own1 + own2 * own2) / (1.0 + aspect**4))
 
 
-def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float = 0.7) -> float:
+def weakest_pair_excluded(sensor: Sensor, frames: int = 100) -> float:
     """Return how weak a second contact may be that a certain place excludes [S].
 
     A contact at least this conductive (spreading in the sheets included) whose normal is DANGEROUS_ANGLE off the place
@@ -176,26 +176,22 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100, noise_counts: float
 
     Args:
         sensor: the sensor.
-        frames: of the touch that are averaged, up to 512.
-        noise_counts: standard deviation of each reading.
+        frames: of the touch that are averaged, up to 512, with the noise that is assumed before any is learned.
     """
     currents = UntouchedCurrents(sensor, 0.0)
     parts = sensor.electronics
-    supply = parts.supply_volts / parts.adc_volts * parts.full_count
-    variance = (noise_counts**2 + 1.0 / 12.0) * (1.0 + currents.aspect**4) / supply**2
     unit = parts.current_full_scale / parts.adc_volts * (sensor.frustum.wrap / DANGEROUS_ANGLE) ** 2
-    noise = math.sqrt(variance / min(frames, _PAIR_FRAMES))
+    noise = math.sqrt(currents.variance / min(frames, _PAIR_FRAMES))
     return unit * _PAIR_DEVIATIONS * max(1.0, _split_noise(sensor, currents.aspect)) * noise / _CERTAIN_SHARE
 
 
-def frames_until_certain(sensor: Sensor, settings: DetectorSettings, noise_counts: float = 0.7) -> int | None:
+def frames_until_certain(sensor: Sensor, settings: DetectorSettings) -> int | None:
     """Return for how many frames a firm touch by one contact lasts before its place is certain. None where it never is.
 
     Args:
         sensor: the sensor.
         settings: the weakest second contact that is to be excluded.
-        noise_counts: standard deviation of each reading.
     """
-    one = weakest_pair_excluded(sensor, 1, noise_counts)  # it falls with the square root of the number of frames
+    one = weakest_pair_excluded(sensor, 1)  # it falls with the square root of the number of frames
     frames = max(1, math.ceil((one / settings.second_contact) ** 2))
     return frames if frames <= _PAIR_FRAMES else None
