@@ -92,7 +92,9 @@ BENCHES = {
     "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
     "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
     "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),
-    "design-assembly": Bench("bench.design.assembly", "Whether a person would build each sheet; poses in which an arm folds."),
+    "design-assembly": Bench(
+        "bench.design.assembly", "Whether a person would build each sheet; poses in which an arm folds."
+    ),
     "design-time": Bench("bench.design.time", "Pictures, and other links."),
     "developable": Bench("bench.design.developable", "Real links: the tubes are planted."),
     "developable-field": Bench("bench.design.developable_field", "A sheet that was built."),
