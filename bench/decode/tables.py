@@ -25,7 +25,7 @@ RATIO_LIMITS = {
 def show_several(electric: str, kinds: list[Several]) -> list[str]:
     """Show presses by several contacts; return the row of their goal."""
     rows, total = [], _sum(kinds)
-    for k in [*kinds, total]:
+    for k in [total, *kinds]:
         worst = " ".join(map(str, k.worst[:5]))
         rows.append([k.kind, *map(str, (k.cases, k.touched, k.valid, k.any_off, k.all_off)), worst])
     title = f"several contacts, {electric}: with a valid frame of {PRESS_FRAMES} whose normal is more than 20 deg off"
