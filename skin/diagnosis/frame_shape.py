@@ -62,18 +62,13 @@ def _wrong_size(frames: Sequence[bytes], length: int, period: int) -> Finding:
     if found := find_padding(frames):
         return found
     said = f"they are {period} bytes long; one has 36, 40 or 52"
-    if period == right - _LAST_FIELD and not _valid_alone(frames):
+    if period == right - _LAST_FIELD and (not frames or any(crc_hqx(frame, 0) for frame in frames[-4:])):
         return Cause.CRC_MISSING.found(f"the frames come without a checksum: {said}")
     if period in _WIRE_BUFFERS and period < right:
         return Cause.CUT_AT_BUFFER.found(f"the frames are cut: {said}")
     if period < right:
         return Cause.FRAME_SIZE.found(f"the frames are too short, a field is missing: {said}")
     return Cause.FRAME_SIZE.found(f"the frames are too long: {said}")
-
-
-def _valid_alone(frames: Sequence[bytes]) -> bool:
-    """Tell whether the frames have a right checksum for the length that they have."""
-    return bool(frames) and not any(crc_hqx(frame, 0) for frame in frames[-4:])
 
 
 def find_padding(frames: Sequence[bytes]) -> Finding | None:
