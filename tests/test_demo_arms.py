@@ -28,7 +28,8 @@ PATIENT = """
 skin_late_ms = 1000
 skin_silence_ms = 1000
 arm_silence_ms = 1000
-program_silence_ms = 1000
+program_silence_ms = 1500
+escalate_ms = 250
 """
 #: where a busy computer has not put the arm under guard before the touch of the scene
 LATER = "".join(
@@ -178,6 +179,7 @@ def test_seven_joints_are_guarded_stopped_and_replayed(site, tmp_path):
     assert [name for name in names if name in order] == order
     details = {event.name: event.details for event in events}
     assert details[EventName.STOPPING]["why"] == "touch"
+    assert EventName.STANDSTILL in details, events
     assert details[EventName.STANDSTILL]["paths"] == ["command"]
     assert details[EventName.STANDSTILL]["speed"] < 0.05 < details[EventName.DECELERATING]["speed"]
 
@@ -189,5 +191,6 @@ def test_an_xarm_that_its_maker_s_client_moves_is_guarded_stopped_and_replayed(s
         assert "stopped by another\n" in iter(program.stdout.readline, "")
     details = {event.name: event.details for event in events}
     assert details[EventName.STOPPING]["why"] == "touch"
+    assert EventName.STANDSTILL in details, events
     assert details[EventName.STANDSTILL]["paths"] == ["command"]
     assert details[EventName.STANDSTILL]["speed"] < 0.05 < details[EventName.DECELERATING]["speed"]

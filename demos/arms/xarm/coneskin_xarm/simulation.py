@@ -91,7 +91,8 @@ def serve(host: str) -> None:
     due = time.monotonic() + _CYCLE
     while True:
         ready = selector.select(max(0.0, due - time.monotonic()))
-        while due <= time.monotonic():  # what a busy computer has held up is made good, before what is asked now
+        now = time.monotonic()
+        while due <= now:  # what a busy computer has held up is made good before what is asked now
             due += _CYCLE
             controller.step()
             for reader in list(readers):
