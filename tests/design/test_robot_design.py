@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from coneskin.cli import main
 from coneskin.core.errors import GeometryError
 from coneskin.design.first_scene import _virtual, read_designs
-from coneskin.design.robot_design import design_robot
+from coneskin.design.robot_design import _outside, design_robot
 from coneskin.design.sheets.cable_way import SheetBody
+from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
@@ -107,3 +109,12 @@ def test_one_scene_takes_the_sensors_of_all_links(
     assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0
     alone = tomllib.loads((tmp_path / "alone.toml").read_text())
     assert [link["name"] for link in alone["link"]] == ["upper_arm_link", "forearm_link"], "as the URDF names them"
+
+
+def test_the_outer_face_of_a_sheet_is_sampled_as_densely_as_a_link() -> None:
+    """It is kept clear of as the link beneath it: a tab 6 mm above the next link's mesh met that link's sheet."""
+    (sheet,) = design_sheets((PlacedFrustum(Frustum(0.05, 0.05, 0.1, 4.0)),), DesignOptions())
+    points = _outside(sheet)
+    assert np.hypot(*points[:, :2].T) == pytest.approx(0.05 + sheet.options.stack.thickness, abs=1e-9)
+    apart = cKDTree(points).query(points, 2)[0][:, 1]
+    assert apart.max() <= 2.0 * 1.5e-3 * (1.0 + sheet.options.stack.thickness / 0.05)

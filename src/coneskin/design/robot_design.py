@@ -28,7 +28,7 @@ from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_link
 
 from .folder import DESIGN_FILE, FileOptions, _new_folder, check_target
 from .link_design import LinkDesign, _fit_link, room_for
-from .sheets.sheet_design import DesignOptions, design_assembly
+from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -113,8 +113,10 @@ def _about(axis: Pose, points: Floats) -> Floats:
     return np.stack([np.hypot(x, y), z, np.arctan2(y, x)], axis=1)
 
 
-def _swept_beside(link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh]) -> list[_SweptLink]:
-    """Return the spaces of the links next to one."""
+def _swept_beside(
+    link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh], skins: Mapping[str, LinkDesign]
+) -> list[_SweptLink]:
+    """Return the spaces of the links next to one, and of the sheets that they have already."""
     from coneskin.geometry.fit.surface_samples import sample_surface
 
     spaces = []
@@ -124,6 +126,8 @@ def _swept_beside(link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, M
             continue
         mesh = meshes[other]
         points = sample_surface(mesh, RayCaster(mesh), _SWEEP_SAMPLES).points
+        if other in skins:
+            points = np.concatenate([points, *(_outside(sheet) for sheet in skins[other].sheets)])
         child = Pose.along(joint.axis)
         parent = joint.origin @ child
         if link == joint.parent:
@@ -131,6 +135,17 @@ def _swept_beside(link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, M
         else:
             spaces.append(_SweptLink(child, _about(parent, points), -joint.upper, -joint.lower))
     return spaces
+
+
+def _outside(sheet: SheetDesign) -> Floats:
+    """Return places of the outer face of a sheet, as near to each other as those of a link [m], shape (n, 3)."""
+    side = sheet.place.frustum
+    lengths = side.slant, side.wrap * max(side.radius1, side.radius2)
+    u, phi = (
+        np.linspace(0.0, end, math.ceil(length / (2.0 * _SAMPLE_RADIUS)) + 1)
+        for end, length in zip((side.slant, side.wrap), lengths, strict=True)
+    )
+    return sheet.outer_face(*np.meshgrid(u, phi, indexing="ij"))[0].reshape(-1, 3)
 
 
 def _assembled(
@@ -190,14 +205,18 @@ def design_robot(
         else:
             reasons.append(f"{name} carries none: {fit.reason}")
     joints = urdf_joints(robot, packages, arguments)
-    beside = {name: _swept_beside(name, joints, meshes) for name in found}
+    beside: dict[str, list[_SweptLink]] = {}
+    skins: dict[str, LinkDesign] = {}
     for name, design in found.items():
+        beside[name] = _swept_beside(name, joints, meshes, skins)
         progress(f"{name}: placing sheets, tabs and cables beside what moves")
         sheets = () if design.fit is None else design.fit.sheets
         cleared = [_clear(sheet, options.stack.thickness, beside[name]) for sheet in sheets]
         if any(one is not sheet for one, sheet in zip(cleared, sheets, strict=True)):
             reasons.append(f"{name}: its sheets are shortened to clear the next link")
-        found[name] = _assembled(design, [one for one in cleared if one is not None], options, beside[name])
+        found[name] = skins[name] = _assembled(
+            design, [one for one in cleared if one is not None], options, beside[name]
+        )
         reasons += [f"{name}: {why}" for why in found[name].notes if why not in design.notes]
     progress("looking at what can be touched")
     sizes = _touchable(found, joints, meshes)
@@ -313,8 +332,8 @@ def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot:
     lines += [f"* [{name}]({name}/report.md): how its sheets are built" for name in links]
     lines += [
         "* Sheets, tabs, ties and cables are clear of the links beside theirs, over the whole range of the joint "
-        "between. Not looked at: links two joints away, joints that slide, the thickness of another link's skin, and "
-        "how a cable passes a joint.",
+        "between, and sheets of each other. Not looked at: links two joints away, joints that slide, and how a cable "
+        "passes a joint.",
     ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
