@@ -208,6 +208,8 @@ def _rows(columns: list[Vector], joints: int) -> tuple[Joints, Joints, Joints]:
 LINK_INDEX: Mapping[str, int] = MappingProxyType(
     {"base": 0, "shoulder": 1, "upper_arm": 2, "forearm": 3, "wrist_1": 4, "wrist_2": 5, "wrist_3": 6}
 )
+#: link -> index of the DH length along which its tube runs
+TUBE_LENGTHS: Mapping[str, int] = MappingProxyType({"upper_arm": 1, "forearm": 2})
 
 #: arm -> shift of the mesh along the joint axis [m] of upper_arm, forearm, wrist_1, wrist_2, wrist_3; wrist_3 along y
 _TUBE_OFFSETS = {

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError, KinematicsError
 from coneskin.core.files import read_file
 from coneskin.core.text import read_json
-from coneskin.robot.arm.kinematics import LINK_INDEX, link_index
+from coneskin.robot.arm.kinematics import LINK_INDEX, TUBE_LENGTHS, link_index
 from coneskin.robot.arm.models import arm_model
-from coneskin.scene.reader import TUBE_LENGTHS
 from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.firmware.board_circuit import toml_lines
 

@@ -29,7 +29,6 @@ TABLES = (
     *("arm", "link", "source", "reaction", "monitoring", "recording"),
     *("motion", "commissioning", "body", "padding", "speed_limit"),
 )
-TUBE_LENGTHS = {"upper_arm": 1, "forearm": 2}  #: link name -> index of the DH length that is the tube's
 #: tomllib's time for a dotted key grows with the cube of its parts: a key of 20 kB takes minutes
 _MAX_PARTS = 64
 _DOTTED_PART = re.compile(r"[\w\"'-][ \t]*\.")
@@ -173,7 +172,7 @@ def _check_links(scene: s.Scene, problems: list[str]) -> None:
 
     Lengths and limits need a known arm.
     """
-    from coneskin.robot.arm.kinematics import LINK_INDEX, link_index, link_name
+    from coneskin.robot.arm.kinematics import LINK_INDEX, TUBE_LENGTHS, link_index, link_name
     from coneskin.robot.arm.models import is_ur
 
     arm = None if scene.arm is None else scene.arm.arm_model

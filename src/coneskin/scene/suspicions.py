@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.finding import Finding
 
-from .reader import TUBE_LENGTHS
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
@@ -104,7 +103,7 @@ def _placing(scene: Scene) -> Iterator[str]:
 
 def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
     """Compare the sensors of a tube with its axis and its neighbour."""
-    from coneskin.robot.arm.kinematics import MESHED_ARMS, link_index, link_mesh, link_name
+    from coneskin.robot.arm.kinematics import MESHED_ARMS, TUBE_LENGTHS, link_index, link_mesh, link_name
     from coneskin.robot.arm.models import arm_model
 
     name = link_name(link_index(link.name))
