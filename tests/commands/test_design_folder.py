@@ -64,6 +64,7 @@ def test_a_replaced_design_leaves_what_a_person_put_beside_it(tmp_path: Path, cy
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+@pytest.mark.long
 def test_a_persons_file_is_not_overwritten(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], cylinder_design: Path
 ) -> None:

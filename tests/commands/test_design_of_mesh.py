@@ -56,6 +56,7 @@ def tube(radius1, radius2, height, sides=96):
         yield low[i], high[i + 1], high[i]
 
 
+@pytest.mark.long
 def test_a_mesh_from_file_to_sensor_in_the_meshs_frame(tmp_path, capsys):
     stl(tmp_path / "cone.stl", list(tube(0.040, 0.050, 0.160)))
     assert design(str(tmp_path / "cone.stl"), "-o", str(tmp_path / "out")) == 0

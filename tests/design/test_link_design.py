@@ -43,6 +43,7 @@ def test_dimensions_are_designed_and_written_in_one_call(tmp_path: Path) -> None
     assert again.folder == tmp_path / "skin"
 
 
+@pytest.mark.long
 def test_a_mesh_is_designed_without_a_folder() -> None:
     design = cs.design_link(tube(), max_sheets=1)
     (sheet,) = design.sheets

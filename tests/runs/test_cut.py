@@ -15,6 +15,7 @@ from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.run_files import summarise_run
 
 
+@pytest.mark.long
 def test_a_cut_replays_to_the_same_contact_and_reaction(collision: Run, tmp_path: Path) -> None:
     cut = cut_run(collision, tmp_path / "cut.rec", around=2.95, keep=1.0, name="demo")
     assert cut.size < 300_000

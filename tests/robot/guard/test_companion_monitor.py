@@ -207,6 +207,7 @@ def test_it_is_active_only_after_the_acknowledgement(external):
     rig.companions.feed = take
 
 
+@pytest.mark.long
 def test_a_release_that_nobody_acknowledges_is_taken_back_and_its_late_answer_counts_for_nothing():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), speed=1.0).run(1.5)
     rig.companions.feed = lambda output: None
@@ -348,6 +349,7 @@ def test_a_restart_that_is_announced_again_and_again_has_no_more_than_5_s():
     assert "the driver's program has ended on the controller" in rig.event("latched").details["why"]
 
 
+@pytest.mark.long
 @pytest.mark.pure  # compiled, the time is a constant
 def test_a_restart_that_was_refused_leaves_the_next_one_its_time(monkeypatch):
     monkeypatch.setattr(companion_monitor, "_RESTART_TIMEOUT", 1.0)

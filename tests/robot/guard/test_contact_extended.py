@@ -42,6 +42,7 @@ def test_hands_beside_the_seam_lie_about_it():
     assert event.details["point"] == pytest.approx(CONE.point(event.details["u"], event.details["phi"]))
 
 
+@pytest.mark.long
 def test_a_second_touch_is_reported_anew():
     both = [touch(start, start + 0.2, u=u) for start in (0.5, 1.2) for u in (0.07, 0.19)]
     rig = GuardRig(*both, reaction=Reaction("stop"), speed=1.0).run(2.0)

@@ -43,6 +43,7 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return saved
 
 
+@pytest.mark.long
 def test_a_collision_with_an_arm(run: Run, tmp_path: Path, figures: list[Any]) -> None:
     draw_run(run, tmp_path / "run.png")
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")

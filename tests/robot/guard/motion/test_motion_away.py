@@ -68,6 +68,7 @@ def test_a_motion_away_brakes_no_harder_than_the_motors_hold(kind, held, expecte
     assert max(sent) == expected
 
 
+@pytest.mark.long
 def test_a_slow_arm_waits_at_standstill_for_the_place_of_the_touch():
     """At 12 bits a place takes some tens of frames, and this arm stands after ten."""
     rig = GuardRig(touch(0.5, 1.5), reaction=Reaction(kind="retreat"), speed=0.05, bits=12).run(1.7)
