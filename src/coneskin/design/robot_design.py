@@ -140,11 +140,9 @@ def _swept_beside(
 def _outside(sheet: SheetDesign) -> Floats:
     """Return places of the outer face of a sheet, as near to each other as those of a link [m], shape (n, 3)."""
     side = sheet.place.frustum
-    lengths = side.slant, side.wrap * max(side.radius1, side.radius2)
-    u, phi = (
-        np.linspace(0.0, end, math.ceil(length / (2.0 * _SAMPLE_RADIUS)) + 1)
-        for end, length in zip((side.slant, side.wrap), lengths, strict=True)
-    )
+    around = side.wrap * max(side.radius1, side.radius2)
+    u = np.linspace(0.0, side.slant, math.ceil(side.slant / (2.0 * _SAMPLE_RADIUS)) + 1)
+    phi = np.linspace(0.0, side.wrap, math.ceil(around / (2.0 * _SAMPLE_RADIUS)) + 1)
     return sheet.outer_face(*np.meshgrid(u, phi, indexing="ij"))[0].reshape(-1, 3)
 
 

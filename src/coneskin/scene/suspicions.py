@@ -16,7 +16,7 @@ from coneskin.core.finding import Finding
 from .required_packages import missing_packages
 
 if TYPE_CHECKING:
-    from coneskin.geometry.pose import Pose, Vector
+    from coneskin.geometry.pose import Pose
     from coneskin.robot.arm.model import ArmModel
 
     from .values.scene import LinkScene, PlacedSensor, Scene
@@ -128,8 +128,9 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
             continue
         beside = max(math.hypot(*begin[:2]), math.hypot(*end[:2]))
         along = in_mesh.rotate((0.0, 0.0, 1.0))
-        if _about_joint(begin, end, along, length):
-            continue
+        from_joint = max(math.hypot(x, min(abs(z), abs(z - length))) for x, _, z in (begin, end))
+        if abs(along[1]) > math.cos(_TILT) and from_joint < _BESIDE:
+            continue  # it lies about the joint at an end of the tube, whose axis is y of the mesh's frame
         tilt = math.acos(min(1.0, abs(along[2])))
         if beside > _BESIDE or tilt > _TILT:
             yield (
@@ -144,12 +145,6 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
                 f"between the axes of upper arm and forearm of a {arm.name}: is it a diameter? Then write "
                 f"{0.5e3 * radius:g}"
             )
-
-
-def _about_joint(begin: Vector, end: Vector, along: Vector, length: float) -> bool:
-    """Tell whether a sheet lies about the joint at an end of a tube, whose axis is y of the mesh's frame."""
-    beside = (math.hypot(x, min(abs(z), abs(z - length))) for x, _, z in (begin, end))
-    return abs(along[1]) > math.cos(_TILT) and max(beside) < _BESIDE
 
 
 def _mesh_frame(link: LinkScene, arm: ArmModel) -> Pose:
