@@ -34,7 +34,7 @@ def sensor_file(tmp_path):
 
 def write(sensor_file, *options):
     folder = sensor_file.parent / "board"
-    return main(["firmware", str(sensor_file), "--to", str(folder), *options]), folder
+    return main(["firmware", str(sensor_file), "-o", str(folder), *options]), folder
 
 
 def part_rows(folder):
@@ -194,7 +194,7 @@ def test_of_a_design_with_two_sheets_both_are_named(tmp_path, capsys):
         (tmp_path / f"sheet-{number}").mkdir()
         (tmp_path / f"sheet-{number}" / "sensor.toml").write_text(CONE, encoding="utf-8")
     for asked in (tmp_path, tmp_path / "sensor.toml"):
-        assert main(["firmware", str(asked), "--to", str(tmp_path / "board")]) == 1
+        assert main(["firmware", str(asked), "-o", str(tmp_path / "board")]) == 1
         said = capsys.readouterr().err
         assert str(tmp_path / "sheet-1" / "sensor.toml") in said
         assert str(tmp_path / "sheet-2" / "sensor.toml") in said

@@ -82,7 +82,7 @@ def test_real_hardware_is_named_and_nothing_is_simulated(here: Path) -> None:
 
 
 def test_the_scene_says_the_values_of_the_board_that_firmware_was_written_for(here: Path, capsys: Output) -> None:
-    assert main(["firmware", "skin/sensor.toml", "--to", "board", "--board", "esp32", "--converter", "ads1115"]) == 0
+    assert main(["firmware", "skin/sensor.toml", "-o", "board", "--board", "esp32", "--converter", "ads1115"]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
     assert said.startswith(
         "then: coneskin init DESIGN-FOLDER --board esp32 --converter ads1115 --port /dev/ttyACM0 --arm"

@@ -276,7 +276,7 @@ def _print_next(design: LinkDesign, output: Path) -> None:
     """Print the commands that can follow."""
     folder = shlex.quote(str(output))
     sensor = shlex.quote(str(output / ("sensor.toml" if len(design.sheets) == 1 else "sheet-1/sensor.toml")))
-    print_hint(f"real hardware: coneskin firmware {sensor} --to board, then coneskin init {folder} --board uno --help")
+    print_hint(f"real hardware: coneskin firmware {sensor} -o board, then coneskin init {folder} --board uno --help")
     unnamed = design.mesh is None or arm_link(design.name) is None
     which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
     guarded = f"coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm"

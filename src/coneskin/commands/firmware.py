@@ -1,9 +1,9 @@
 """Command ``coneskin firmware``: the sketch of a board, its wiring and its parts, for a sensor.
 
 example:
-  coneskin firmware out/sensor.toml --to board              for an Arduino Uno
-  coneskin firmware out/sensor.toml --board pico --to board
-  coneskin firmware out/sensor.toml --converter ads1115 --to board     15 bits, 40 frames a second
+  coneskin firmware out/sensor.toml -o board                for an Arduino Uno
+  coneskin firmware out/sensor.toml --board pico -o board
+  coneskin firmware out/sensor.toml --converter ads1115 -o board       15 bits, 40 frames a second
 
 The folder then holds the sketch (coneskin/coneskin.ino), wiring.svg, board.md with pins, cable, first steps, settings
 and what the scene must say, parts.csv, board.net for KiCad, and frame_vectors.csv: 50 frames with which other firmware
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--board", choices=list(boards()), default="uno", help="which board (default: %(default)s)")
     help_text = "the board's own, two ADS1x15 on its I2C pins, or an LTC1867 on SPI (default: %(default)s)"
     add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help=help_text)
-    add("--to", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
+    add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="folder to write; made if need be")
     add("--flash", metavar="PORT", help="compile the sketch and write it onto the board at this port")
     add("--force", action="store_true", help="replace files that are there already and are others")
 
@@ -71,25 +71,25 @@ def run(args: argparse.Namespace) -> int:
     circuit = board_circuit(args.board, built[0], args.converter)
     source: Path = firmware_folder()
     own = [*(source / "coneskin").iterdir(), source / "frame_vectors.csv"]
-    files = {args.to / path.relative_to(source): path.read_bytes() for path in own if path.is_file()}
-    files[args.to / "coneskin" / "coneskin_board.h"] = board_header(args.converter)
-    files[args.to / "wiring.svg"] = wiring_diagram(circuit).encode()
-    files[args.to / "parts.csv"] = circuit.part_list().encode()
-    files[args.to / "board.net"] = circuit.kicad_netlist().encode()
-    files[args.to / "board.md"] = board_page(circuit).encode()
+    files = {args.output / path.relative_to(source): path.read_bytes() for path in own if path.is_file()}
+    files[args.output / "coneskin" / "coneskin_board.h"] = board_header(args.converter)
+    files[args.output / "wiring.svg"] = wiring_diagram(circuit).encode()
+    files[args.output / "parts.csv"] = circuit.part_list().encode()
+    files[args.output / "board.net"] = circuit.kicad_netlist().encode()
+    files[args.output / "board.md"] = board_page(circuit).encode()
     there = [str(path) for path, data in files.items() if path.exists() and path.read_bytes() != data]
     if there and not args.force:
         raise GeometryError(
-            f"{', '.join(there)} would be replaced: name another folder with --to, or replace them with --force"
+            f"{', '.join(there)} would be replaced: name another folder with -o, or replace them with --force"
         )
     for path, data in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
-    print(f"wrote firmware, wiring and parts to {args.to}, for: {circuit.facts.title}")
+    print(f"wrote firmware, wiring and parts to {args.output}, for: {circuit.facts.title}")
     if args.flash:
-        _flash(args.to / "coneskin", circuit, args.flash)
+        _flash(args.output / "coneskin", circuit, args.flash)
         print(f"flashed the board at {args.flash}")
-    print(f"next: wire it as in {args.to / 'wiring.svg'} and flash it as in {args.to / 'board.md'}")
+    print(f"next: wire it as in {args.output / 'wiring.svg'} and flash it as in {args.output / 'board.md'}")
     board = f"--board {args.board}" + (f" --converter {args.converter}" if circuit.converter else "")
     print("of several sheets each has a board: the second gets `sensor=1`, as in its board.md, and a --port of its own")
     print(f"then: coneskin init DESIGN-FOLDER {board} --port /dev/ttyACM0 --arm MODEL --host ADDRESS")
