@@ -35,5 +35,5 @@ def test_the_events_of_two_runs_count_from_the_first_touch_and_say_whose_they_ar
 def test_a_run_that_a_page_has_no_room_for_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_course, "_MAX_RUN_SIZE", RUN.stat().st_size - 1)
     monkeypatch.setattr(run_course, "read_run", lambda _: pytest.fail("it is read"))
-    with pytest.raises(RecordingError, match=r"has 0\.1 MB, and a page shows at most .* coneskin runs cut"):
+    with pytest.raises(RecordingError, match=r"has 0\.0995 MB, and a page shows at most .* coneskin runs cut"):
         read_courses([RUN])
