@@ -193,7 +193,7 @@ def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Finding | Non
 def _find_rate(frames: Sequence[Frame], times: Sequence[float], numbers: FrameNumbers) -> Finding | None:
     if numbers.missing > _LOST_SHARE:
         lost, held = f"{100.0 * numbers.missing:.1f} % of the frames never come", numbers.held_up
-        if held:
+        if held >= numbers.missing * (times[-1] - times[0]):  # no more can be lost in that time
             return Cause.HELD_UP.found(f"{lost}, and this computer held others up for {1e3 * held:.0f} ms")
         return Cause.FRAMES_LOST.found(lost)
     if numbers.rate < _MIN_RATE:

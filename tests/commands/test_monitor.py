@@ -23,7 +23,7 @@ from ..skin.diagnosis.corpus import BAUD, MISTAKES, NOT_TO_BE_NAMED, WITH_A_SCEN
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
 FIRST_LOOK = 2.0  # s until the monitor's first line
-DEADLINE = 60.0  # s until a line has named the mistake
+DEADLINE = 30.0  # s until a line has named the mistake
 
 
 @pytest.fixture(scope="module")
@@ -107,10 +107,11 @@ def test_every_mistake_is_named_on_a_port(program: Path) -> None:
     """The corpus, each mistake on a pseudo-terminal of its own, in real time.
 
     That each is named within two seconds of its bytes is shown with given times, in test_diagnose. A computer that is
-    busy with something else holds bytes back, and that is what is named until it lets them through.
+    busy with something else holds bytes back, and that is what is named until it lets them through: of a few at most.
     """
     names = [name for name in (*MISTAKES, *NOT_TO_BE_NAMED) if name not in WITH_A_SCENE]
     wrong: dict[str, str] = {}
+    held_up: set[str] = set()
 
     def hear(name: str) -> None:
         sender = subprocess.Popen([program, name, f"{DEADLINE:g}", "--port"], stdout=subprocess.PIPE, text=True)
@@ -127,8 +128,12 @@ def test_every_mistake_is_named_on_a_port(program: Path) -> None:
                         named = listener.report(now).diagnosis
                         if named.item == {**MISTAKES, **NOT_TO_BE_NAMED}[name].key:
                             wrong.pop(name, None)
+                            held_up.discard(name)
                             return
                         wrong[name] = named.line
+                        if named.item == Cause.HELD_UP.key:
+                            del wrong[name]
+                            held_up.add(name)
         finally:
             sender.kill()
             sender.communicate()
@@ -140,3 +145,4 @@ def test_every_mistake_is_named_on_a_port(program: Path) -> None:
         for thread in threads:
             thread.join()
     assert wrong == {}
+    assert len(held_up) <= 0.2 * len(names)
