@@ -99,6 +99,7 @@ def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
             "*.h",
             "*.c",
             "*.toml",
+            "*.txt",
             "gallery/*.rec",
         )
         for path in folder.rglob(pattern)

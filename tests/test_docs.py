@@ -34,23 +34,13 @@ PAGES = {
     path.relative_to(ROOT).as_posix(): path
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 }
-#: pages whose blocks start processes, or compute for seconds
-LONG = {"README.md", "docs/look-up/sim-ur.md", "docs/understand/field.md"}
-LONG |= {
-    f"docs/do/{name}.md"
-    for name in (
-        "calibrate",
-        "commission",
-        "design",
-        "guard-external",
-        "guard-internal",
-        "impact",
-        "permissible-speed",
-        "replay",
-        "runs",
-        "ur-controller",
-    )
-}
+#: pages whose blocks compute for seconds
+LONG = {f"docs/{name}.md" for name in ("understand/field", "do/design", "do/permissible-speed", "do/runs")}
+#: pages whose blocks guard an arm, and need a share of the computer
+LIVE = {"README.md", "docs/look-up/sim-ur.md"}
+LIVE |= {f"docs/do/{name}.md" for name in ("calibrate", "commission", "guard-external", "guard-internal", "impact")}
+LIVE |= {f"docs/do/{name}.md" for name in ("replay", "ur-controller")}
+MARKS = {**dict.fromkeys(LONG, (pytest.mark.long,)), **dict.fromkeys(LIVE, (pytest.mark.long, pytest.mark.processes))}
 #: blocks that no test runs, each with its reason in the page
 NOT_RUN = 3
 specification = importlib.util.spec_from_file_location("reference", ROOT / "scripts" / "reference.py")
@@ -239,7 +229,7 @@ def page_run(tmp_path: Path) -> Iterator[PageRun]:
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs pseudo-terminals and loopback addresses")
 @pytest.mark.parametrize(  # the tutorial runs as its notebook, in test_notebook
     "page",
-    [pytest.param(p, marks=[pytest.mark.long] if p in LONG else []) for p in PAGES if "first-collision" not in p],
+    [pytest.param(p, marks=MARKS.get(p, ())) for p in PAGES if "first-collision" not in p],
 )
 def test_the_blocks_of_a_page_run(page: str, page_run: PageRun) -> None:
     for block in blocks(PAGES[page]):
