@@ -42,6 +42,7 @@ _CONTACT_FAULTS = frozenset(
 )
 _MAX_CONTRADICTIONS: Final = 2.5  # frames; the fourth in a row is a fault, three may be a contact that closes slowly
 _UNREADY_TIME: Final = 1.0  # s of a sensor that is neither touched nor quiet, after which it says so: it is not ready
+_QUIET_WEIGHT: Final = 9  # frames that are neither, besides one, that a quiet one takes off their count
 _CONTRADICTION_DECAY: Final = 0.1  # frames; each good frame takes so many off the count
 
 
@@ -273,7 +274,7 @@ class Detector:
             if -self._quiet * self.timing.period > (settings.lasting_touch if self.ready else _UNREADY_TIME):
                 self._report(events, Fault.DRIFT, frame, now, f"{whole:+.3f} of the level, for long")
             return
-        self._quiet = max(self._quiet, 0) + 1
+        self._quiet = (self._quiet if self._quiet >= 0 else min(self._quiet + _QUIET_WEIGHT, 0)) + 1
         if self._diagnosis.active:
             self._diagnosis.end()
         self._leak.feed(frame, whole)

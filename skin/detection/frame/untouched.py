@@ -181,6 +181,7 @@ class UntouchedZero:
         self.nominal = self.counts = round(parts.current_zero / parts.current_full_scale * self._full)
         self.most = round(_ZERO_LIMIT * self._full)
         self._unit = max(1, round(self._full / 4095))  # counts: one of 12 bits or less, its share of more
+        self._rest = min(self._unit, max(1, int(0.25 * bounds.touch_current_slack)))  # well within what is no leak
         self._per_guide = bounds.touch_current_per_guide
         self._seen: list[float] = []
         self._waited = self._since = 0.0
@@ -215,14 +216,14 @@ class UntouchedZero:
         if self.most < abs(off) <= 4 * self.most:  # beyond, no amplifier is the cause
             self.excess = f"{100.0 * off / self._full:+.2f} % of full scale, at most {100.0 * _ZERO_LIMIT:.1f} %"
         change = median - self.counts
-        if not -self.most <= off <= self.most or -self._unit <= change <= self._unit:
+        if not -self.most <= off <= self.most or -self._rest <= change <= self._rest:
             return False
         if free:
             self.counts = median
             return True
         if self._waited >= _ZERO_STEP:
             self._waited = 0.0
-            self.counts += self._unit if change > 0 else -self._unit
+            self.counts += max(-self._unit, min(self._unit, change))
         return False
 
     def lacks(self, frame: Frame) -> bool:

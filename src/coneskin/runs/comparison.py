@@ -275,17 +275,13 @@ def _comparable(events: Sequence[GuardEvent], diverged: float) -> list[GuardEven
     """Return the events that are about the same motion: the skin's, and the arm's up to its first other reaction."""
     kept, reacted = [], False
     for event in events:
+        for_touch = event.name == EventName.SPEED_REDUCED or "contact" in event.details  # and not for what the arm does
         if event.name in SKIN_EVENTS or event.time < diverged:
             kept.append(event)
-        elif event.name in _REACTION_EVENTS and not reacted and (event.time <= diverged or _of_skin(event)):
+        elif event.name in _REACTION_EVENTS and not reacted and (event.time <= diverged or for_touch):
             reacted = True
             kept.append(event)
     return kept
-
-
-def _of_skin(reaction: GuardEvent) -> bool:
-    """Tell whether a reaction is made for a touch, and not for what the arm does."""
-    return reaction.name == EventName.SPEED_REDUCED or "contact" in reaction.details
 
 
 def _differences(pairs: Sequence[_EventPair], tolerances: Tolerances) -> list[Difference]:

@@ -81,3 +81,13 @@ def test_damp_between_the_thresholds_is_the_reason_why_a_sensor_is_not_ready_or_
         events, detector, _ = play(VirtualSkin(SENSOR, [light], rate_hz=50.0, duration=seconds, model="ladder"))
         assert [event.fault for event in events if isinstance(event, SkinFault)] == faults
         assert not detector.touched
+
+
+def test_one_quiet_frame_in_fifty_takes_no_damp_back():
+    damp = VirtualSkin(SENSOR, rate_hz=50.0, duration=3.0, model="ladder", imperfections=Imperfections(leak=2e-5))
+    dry = next(iter(VirtualSkin(SENSOR, rate_hz=50.0, model="ladder").frames()))[1]
+    detector, faults = Detector(SENSOR), []
+    for n, (time, frame) in enumerate(damp.frames()):
+        frame = frame if n % 50 else dry._replace(sequence=frame.sequence, clock_us=frame.clock_us)
+        faults += [event.fault for event in detector.feed(frame, time) if isinstance(event, SkinFault)]
+    assert faults[0] is Fault.DRIFT

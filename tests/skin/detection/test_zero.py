@@ -115,6 +115,15 @@ def run(offset_at, seconds=8.0, rate=500, sensor=BIASED, touches=()):
     return faults, detector
 
 
+@pytest.mark.parametrize("millivolts", [0.01, 0.015, 0.03])
+def test_an_offset_that_parts_may_have_is_no_leak_of_a_low_ring(millivolts):
+    """Its touch current is small: a zero may rest less far off than a count of 12 bits, which here is 16."""
+    ring = Sensor(Frustum(0.06, 0.06, 0.02, math.radians(350.0)))
+    faults, _, ready, _ = play(ring, millivolts, touches=())
+    assert faults == []
+    assert ready < 0.5
+
+
 @pytest.mark.parametrize("rate", [-0.8, 0.8])
 def test_learned_currents_go_with_a_zero_that_creeps(rate):
     """After a touch of seconds it is off by counts, and the small current of a slender sheet was called changed."""
