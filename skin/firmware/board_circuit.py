@@ -30,9 +30,7 @@ _USUAL_SILENCE_MS = 50  # what a scene allows by default
 _SPI_PINS = {"10": "CS", "11": "MOSI", "12": "MISO", "13": "SCK"}  # of an Uno or Nano
 _FIXED_VOLTS = 2.5  # of the cheap regulator
 _SHUNT_PARTS = ((10.0, "resistor"), (1.0, "low_shunt"), (0.0, "least_shunt"))  # from so many ohm on
-_LIST_COLUMNS = (
-    "count,names,what,value,number,second source,EUR each,EUR,data sheet,limits not sourced"  # of the list of parts
-)
+_LIST_COLUMNS = "count,names,what,value,number,second source,EUR each,EUR,data sheet,limits not sourced"
 WIRES = (  # of the cable, each electrode a pair: what drives it, and what reads it
     *(("E_A", "white"), ("S_A", "brown"), ("E_B", "green"), ("S_B", "yellow"), ("E_C", "grey"), ("S_C", "pink")),
     *(("E_D", "blue"), ("S_D", "red"), ("GND", "black, violet"), ("SHIELD", "braid, here only")),
@@ -88,6 +86,18 @@ class BoardCircuit(NamedTuple):
         return found
 
     @property
+    def words(self) -> str:
+        """Options of a command that name this board."""
+        return f"--board {self.board.name}" + (f" --converter {self.converter.name}" if self.converter else "")
+
+    @property
+    def clip_share(self) -> float:
+        """Drive current at which the amplifier, on 3V3, ends: a part of the larger one."""
+        sensor, volts = self.sensor, 3.3 - 1e-3 * float(part_catalog()["amplifier"]["limits"]["swing_mv"][1])
+        most = volts / (SENSE_GAIN * self.shunt_ohms) - sensor.electronics.current_zero
+        return most / max(sensor.radial_amperes, sensor.angular_amperes)
+
+    @property
     def components(self) -> list[Component]:
         """Everything, the board that the sketch runs on first."""
         return list(_components(self))
@@ -96,7 +106,8 @@ class BoardCircuit(NamedTuple):
         """Return the bill of materials as CSV, a line for all alike, with a price for all of them [EUR]."""
         catalog, lines = part_catalog(), io.StringIO()
         alike: dict[tuple[str, str], list[str]] = {}
-        others = [Component("W1", "cable", "", "", {}), *(Component(f"X{k}", "socket", "", "", {}) for k in (1, 2))]
+        strip = "pin_strip" if self.board.name == "uno" else "socket"
+        others = [Component("W1", "cable", "3 m", "", {}), *(Component(f"X{k}", strip, "", "", {}) for k in (1, 2))]
         for component in self.components:
             if package := catalog[component.part].get("adapter"):
                 others.append(Component(f"X{component.name}", "adapter", package, "", {}))
@@ -135,7 +146,7 @@ class BoardCircuit(NamedTuple):
         if facts.logic_volts > 3.3 and self.converter is None:
             found["AREF"] = "3V3"
         if self.converter is not None:
-            found |= _SPI_PINS if self.converter.pull_down else {"SDA": "SDA", "SCL": "SCL"}
+            found |= _SPI_PINS if self.converter.pull_down else dict(zip(facts.i2c, ("SDA", "SCL"), strict=True))
         elif board.common:
             found |= {board.common: "MUX", **{pin: f"MUX_{k}" for k, pin in enumerate(board.select)}}
         else:
@@ -149,11 +160,7 @@ class BoardCircuit(NamedTuple):
 
 def toml_lines(values: Mapping[str, float | int | list[float]]) -> list[str]:
     """Return keys and values as lines of TOML."""
-    return [f"{key} = {_value_text(value)}" for key, value in values.items()]
-
-
-def _value_text(value: float | int | list[float]) -> str:
-    return f"[{', '.join(map(_value_text, value))}]" if isinstance(value, list) else f"{value:.10g}"
+    return [f"{key} = {value}" for key, value in values.items()]
 
 
 def _ohms_text(ohms: float) -> str:
@@ -187,8 +194,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
         )
     shunt, supply = shunt_ohms(sensor.electronics), sensor.electronics.supply_volts
     if supply != _FIXED_VOLTS:  # what a resistor of E96 at 100 uA gives
-        decade = math.floor(math.log10(supply))
-        supply = round(10.0 ** (round(96.0 * math.log10(supply)) / 96.0 - decade), 2) * 10.0**decade
+        supply = float(f"{10.0 ** (round(96.0 * math.log10(supply)) / 96.0):.3g}")
     bits, volts, other = board.bits + _EXTRA_BITS, sensor.electronics.adc_volts, None
     if converter == BUILT_IN and not board.sense:
         raise SensorError(

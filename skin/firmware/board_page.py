@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from textwrap import indent
 from xml.sax.saxutils import escape
@@ -13,13 +14,12 @@ from .boards import firmware_folder, part_catalog
 def board_page(circuit: BoardCircuit) -> str:
     """Return the page that stands beside the sketch."""
     sensor, parts = circuit.sensor, circuit.sensor.electronics
-    count, bias = parts.full_count, 50.0 * parts.current_zero * circuit.shunt_ohms
-    clip = (3.3 - 1e-3 * part_catalog()["amplifier"]["limits"]["swing_mv"][1] - bias) / (50.0 * circuit.shunt_ohms)
     rate, remark = circuit.facts.rate, f"{circuit.facts.remark} "
     if (other := circuit.converter) is not None:  # what is remarked is of the board's own converter
         chips = f"{'an' if other.pull_down else 'two'} {other.name.upper()} in place of its converter"
         rate, remark = f"{other.rate_hz}, measured in emulation on an Uno, with {chips}", ""
     limits = ["[monitoring]", *toml_lines(circuit.monitoring)] if circuit.monitoring else []
+    row, bought = part_catalog()[circuit.board.name], csv.DictReader(circuit.part_list().splitlines())
     template = (firmware_folder() / "board_page.txt").read_text(encoding="utf-8")
     return template.format(
         circuit=circuit,
@@ -28,28 +28,23 @@ def board_page(circuit: BoardCircuit) -> str:
         remark=remark,
         radial=1e3 * sensor.radial_amperes,
         angular=1e3 * sensor.angular_amperes,
-        radial_ends=_ends(sensor.b_positive, "B", "A"),
-        angular_ends=_ends(sensor.c_positive, "C", "D"),
-        full_scale=1e3 * parts.current_full_scale,
-        clip=1e3 * clip,
-        share=clip / max(sensor.radial_amperes, sensor.angular_amperes),
+        radial_ends="B to A" if sensor.b_positive else "A to B",
+        angular_ends="C to D" if sensor.c_positive else "D to C",
+        price=sum(float(row["EUR"]) for row in bought if row["names"] != "A1"),
+        row=row,
         pins="\n".join(f"| {pin} | {net} |" for pin, net in circuit.pins.items()),
         poles="\n".join(f"| {number} | {net} | {colour} |" for number, (net, colour) in enumerate(WIRES, 1)),
-        bias=1e3 * bias,
         zero=parts.count_amperes(0.0),
-        zero_most=round(0.012 * count),
+        zero_most=round(0.012 * parts.full_count),
+        zero_near=max(2, parts.full_count // 1000),
         supply=parts.count_volts(parts.supply_volts),
         radial_counts=parts.count_amperes(sensor.radial_amperes),
         angular_counts=parts.count_amperes(sensor.angular_amperes),
-        guide_most=max(2, count // 100),
+        guide_most=max(2, parts.full_count // 100),
         keys=indent("\n".join(toml_lines(circuit.keys)), "    "),
         limits="".join(f"    {line}\n" for line in limits),
         settings=_settings(circuit),
     )
-
-
-def _ends(normal: bool, first: str, second: str) -> str:
-    return f"{first} to {second}" if normal else f"{second} to {first}"
 
 
 def _settings(circuit: BoardCircuit) -> str:
@@ -97,7 +92,8 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
             for component in components:
                 row = catalog[component.part]
                 pads = {} if component.name == "A1" else row["pins"]  # its own names stand on it
-                drawn, height = _drawn(x, y, component, component.value or row["number"].split()[-1], pads)
+                value = component.pins["1"] if component.part == "test_point" else component.value
+                drawn, height = _drawn(x, y, component, value or row["number"].split()[-1], pads)
                 out += drawn
                 y += height
             y += _GROUP_GAP
@@ -107,7 +103,7 @@ def wiring_diagram(circuit: BoardCircuit) -> str:
         f"<style>{_SVG_STYLE}</style>",
         f'<rect width="{_WIDTH}" height="{lowest + 10}" style="fill:#fff;stroke:none"/>',
         _text(20, 36, f"{circuit.facts.title} and {circuit.sensor.name}", "title"),
-        _text(20, 58, "Pins of the same word are joined; numbers are pads. E drives, S reads: a twisted pair."),
+        _text(20, 58, "Equal words are joined; numbers are pads, of A1 names on it. E drives, S reads: twisted."),
     ]
     return "\n".join([*head, *out, "</svg>", ""])
 
@@ -119,7 +115,7 @@ def _drawn(x: int, y: int, part: Component, value: str, pads: Mapping[str, list[
         ends = [_net(x - 74, y + 12, pins[0][1], "end"), *(_net(x + 74, y + 12, net, "start") for _, net in pins[1:])]
         body = f'<rect x="{x - 70}" y="{y + 1}" width="140" height="{_ROW_HEIGHT - 1}"/>'
         return [body, _text(x, y + 12, f"{part.name} {value}".strip(), "", "middle"), *ends], _ROW_HEIGHT + 2
-    rows = (len(pins) + 1) // 2
+    rows, y = (len(pins) + 1) // 2, y + 8  # its title apart from what is above
     out = [
         f'<rect x="{x - 70}" y="{y + 16}" width="140" height="{rows * _ROW_HEIGHT + 4}"/>',
         _text(x, y + 12, f"{part.name} {value}", "name", "middle"),
@@ -131,7 +127,7 @@ def _drawn(x: int, y: int, part: Component, value: str, pads: Mapping[str, list[
         told = " ".join(both if left else both[::-1]).strip()
         out.append(_text(x - 66 if left else x + 66, at, told, "", "start" if left else "end"))
         out.append(_net(x - 74 if left else x + 74, at, net, "end" if left else "start"))
-    return out, rows * _ROW_HEIGHT + 32
+    return out, rows * _ROW_HEIGHT + 40
 
 
 def _net(x: int, y: int, net: str, anchor: str) -> str:

@@ -25,6 +25,8 @@ class BoardFacts(NamedTuple):
     rate: str  #: frames per second with the usual settings
     remark: str
     pin_prefix: str = ""  #: of a pin's number, as it stands on the board
+    port: str = "/dev/ttyACM0"  #: that Linux gives it
+    i2c: tuple[str, ...] = ("A4", "A5")  #: its pins SDA and SCL
 
 
 _BOARD_PATTERN = re.compile(r"^const Board BOARD = \{(.*)\};$", re.MULTILINE)
@@ -32,7 +34,6 @@ _CONVERTER_PATTERN = re.compile(r'^const Converter CONVERTER = \{"([a-z]+\d+)", 
 _CONVERTER_CHOICE = "#define CONESKIN_CONVERTER "
 _HEADER_PATH = Path("coneskin") / "coneskin_board.h"
 _WORD_PATTERN = re.compile(r'"?([\w.-]+)"?')
-_NO_PIN = "NONE"
 
 
 class Board(NamedTuple):
@@ -68,8 +69,7 @@ class Converter(NamedTuple):
         return tuple(f"CH{n}" if self.pull_down else f"0x{0x48 + n // 4:x} AIN{n % 4}" for n in range(6))
 
 
-#: name of a board's own converter
-BUILT_IN = "built-in"
+BUILT_IN = "built-in"  #: name of a board's own converter
 
 
 def firmware_folder() -> Path:
@@ -128,4 +128,4 @@ def _words(row: str) -> Any:
 
 
 def _pins(listed: Sequence[str]) -> tuple[str, ...]:
-    return tuple(pin for pin in listed if pin != _NO_PIN)
+    return tuple(pin for pin in listed if pin != "NONE")

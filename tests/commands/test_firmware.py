@@ -1,5 +1,6 @@
 """Command ``coneskin firmware``: what it writes for each board."""
 
+import argparse
 import csv
 import os
 import re
@@ -12,10 +13,12 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
+from coneskin.commands.firmware import add_arguments
 from coneskin.geometry.frustum import Frustum
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.electronics import Electronics
 from coneskin.skin.firmware.board_circuit import board_circuit
+from coneskin.skin.firmware.board_page import board_page, wiring_diagram
 from coneskin.skin.firmware.boards import BUILT_IN, boards, converters, firmware_folder, part_catalog
 from coneskin.skin.sensor import Sensor
 from tests.support.firmware.spice_deck import SENSORS
@@ -292,3 +295,66 @@ def test_the_amplifier_still_reads_twice_the_current(sensor):
     circuit = board_circuit("pico", SENSORS[sensor])
     ends = (3.3 * 0.985 - 0.04) / (50.0 * circuit.shunt_ohms) - circuit.sensor.electronics.current_zero
     assert ends > 2.0 * max(circuit.sensor.radial_amperes, circuit.sensor.angular_amperes)
+
+
+PINOUTS = {  # of what may stand on the pads of another part, from the documents of the second one
+    "XC6206P252MR-G": "GND OUT IN",
+    "INA186A2IDCKR": "REF GND VS IN+ IN- OUT",
+    "ADG1612BRUZ": "SEL1 D1 S1 NC GND S4 D4 SEL4 SEL3 D3 S3 NC VDD S2 D2 SEL2",
+    "ADG708BRUZ": "A0 EN VSS S1 S2 S3 S4 D S8 S7 S6 S5 VDD GND A2 A1",
+    "LTC1863CGN#PBF": "CH0 CH1 CH2 CH3 CH4 CH5 CH6 CH7/COM REFCOMP VREF CS/CONV SCK SDO SDI GND VDD",
+}
+SAME_BOARD = {"ESP32-DevKitC-VE", "SC0917", "DEV-15583"}  # all pads at their places
+
+
+def test_a_second_source_has_the_pads_of_the_first_or_says_so():
+    for name, row in part_catalog().items():
+        second = row.get("second", "")
+        if len(row["pins"]) < 3 or second.startswith("none") or re.search(r"other (pads|pins)", second):
+            continue
+        maker_number = next(word for word in second.split() if word in {*PINOUTS, *SAME_BOARD})  # else nobody looked
+        if maker_number in PINOUTS:
+            pads = PINOUTS[maker_number].split()
+            assert row["pins"] == {pin: [str(k) for k, at in enumerate(pads, 1) if at == pin] for pin in pads}, name
+
+
+NOT_TO_DRIVE = {  # GPIO that are a module's own, that set how it starts, its serial port, and inputs alone
+    "ESP32-DevKitC-32E": {*range(6, 12), 0, 2, 5, 12, 15, 1, 3, *range(34, 40)},
+    "ESP32-DevKitC-VE": {*range(6, 12), 16, 17, 0, 2, 5, 12, 15, 1, 3, *range(34, 40)},  # 16, 17: its PSRAM
+}
+
+
+def test_pins_of_an_esp32_can_be_driven_on_each_board_that_is_named():
+    row, board = part_catalog()["esp32"], boards()["esp32"]
+    for number in (row["number"], row["second"]):
+        taken = NOT_TO_DRIVE[number.split()[-1]]
+        assert taken.isdisjoint(map(int, (*board.rail, *board.ground, *board.pull_down))), number
+
+
+@pytest.mark.parametrize(("board", "converter"), BUILDS)
+def test_what_is_to_be_typed_means_this_board_and_what_is_printed_on_it(board, converter):
+    circuit = board_circuit(board, Sensor(Frustum(0.0375, 0.0375, 0.24, 6.1)), converter)
+    page, drawing = board_page(circuit), wiring_diagram(circuit)
+    (line,) = re.findall(r"^    coneskin firmware (.*)$", page, re.MULTILINE)
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    asked = parser.parse_args(line.split())
+    assert (asked.board, asked.converter) == (board, converter)
+    port = "/dev/ttyUSB0" if board == "esp32" else "/dev/ttyACM0"  # a bridge, or USB of the board's own
+    assert asked.flash == port
+    assert {*re.findall(r"/dev/tty\w+(?=[ \"])", page.split("Build it")[0] + page.split("First steps")[1])} == {port}
+    assert "numbers are pads, of A1 names on it" in drawing
+    if converter.startswith("ads"):
+        wire = {"esp32": ("21", "22"), "pico": ("GP4", "GP5"), "teensy": ("18", "19")}.get(board, ("A4", "A5"))
+        assert [circuit.pins[pin] for pin in wire] == ["SDA", "SCL"]
+    strip = next(row for row in csv.DictReader(circuit.part_list().splitlines()) if row["names"] == "X1 X2")
+    assert strip["number"].split()[-1].startswith("TSW" if board == "uno" else "SSW")
+
+
+def test_a_shunt_that_measured_sheets_make_too_large_is_warned_of(sensor_file, capsys):
+    for ohms, warned in ((1000, False), (600, True)):
+        sensor_file.write_text(f"{CONE}current_full_scale_ma = 5.84\nupper_sheet_ohm = {ohms}\n", encoding="utf-8")
+        _, folder = write(sensor_file, "--force")
+        assert ("R1 is too large for these sheets" in capsys.readouterr().out) == warned
+        (share,) = re.findall(r"([\d.]+) times the larger one", (folder / "board.md").read_text(encoding="utf-8"))
+        assert (float(share) < 2.0) == warned

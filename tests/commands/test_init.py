@@ -85,7 +85,7 @@ def test_the_scene_says_the_values_of_the_board_that_firmware_was_written_for(he
     assert main(["firmware", "skin/sensor.toml", "-o", "board", "--board", "esp32", "--converter", "ads1115"]) == 0
     said = capsys.readouterr().out.splitlines()[-1]
     assert said.startswith(
-        "then: coneskin init DESIGN-FOLDER --board esp32 --converter ads1115 --port /dev/ttyACM0 --arm"
+        "then: coneskin init DESIGN-FOLDER --board esp32 --converter ads1115 --port /dev/ttyUSB0 --arm"
     )
     words = ["--skin-only", "--port", "/dev/ttyACM0", "--board", "esp32", "--converter", "ads1115"]
     assert main(["init", "skin", *words]) == 0

@@ -47,7 +47,7 @@ const Board BOARD = {"pico", 12, 921600, {0, 1, 2, 3}, 4, 5, {2, 3, 6, 7}, {8, 9
 #elif defined(CORE_TEENSY)
 const Board BOARD = {"teensy", 12, 921600, {A0, A1, A2, A3}, A4, A5, {2, 3, 4, 5}, {6, 7, 8, 9}, {10, 11}, {NONE, NONE, NONE}, NONE};
 #elif defined(ARDUINO_ARCH_ESP32)
-const Board BOARD = {"esp32", 12, 921600, {NONE, NONE, NONE, NONE}, NONE, NONE, {16, 17, 18, 19}, {32, 33, 23, 25}, {26, 27}, {NONE, NONE, NONE}, NONE};
+const Board BOARD = {"esp32", 12, 921600, {NONE, NONE, NONE, NONE}, NONE, NONE, {13, 4, 18, 19}, {32, 33, 23, 25}, {26, 27}, {NONE, NONE, NONE}, NONE};
 #else
 #error "This board has no row yet: add one above, with the pins that you wired and the bits of its converter."
 #endif

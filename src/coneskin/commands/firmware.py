@@ -86,13 +86,14 @@ def run(args: argparse.Namespace) -> int:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     print(f"wrote firmware, wiring and parts to {args.output}, for: {circuit.facts.title}")
+    if circuit.clip_share < 2.0:
+        print(f"warning: R1 is too large for these sheets, a short may be missed: see {args.output / 'board.md'}")
     if args.flash:
         _flash(args.output / "coneskin", circuit, args.flash)
         print(f"flashed the board at {args.flash}")
     print(f"next: wire it as in {args.output / 'wiring.svg'} and flash it as in {args.output / 'board.md'}")
-    board = f"--board {args.board}" + (f" --converter {args.converter}" if circuit.converter else "")
     print("of several sheets each has a board: the second gets `sensor=1`, as in its board.md, and a --port of its own")
-    print(f"then: coneskin init DESIGN-FOLDER {board} --port /dev/ttyACM0 --arm MODEL --host ADDRESS")
+    print(f"then: coneskin init DESIGN-FOLDER {circuit.words} --port {circuit.facts.port} --arm MODEL --host ADDRESS")
     return 0
 
 
@@ -129,8 +130,7 @@ def _compile_for_uno(sketch: Path, folder: Path) -> Path:
     source.write_bytes(b"#include <Arduino.h>\n" + (sketch / "coneskin.ino").read_bytes())
     files = [source, *(path for end in ("c", "cpp", "S") for path in sorted(core.glob(f"*.{end}")))]
     files += [wire / "Wire.cpp", wire / "utility/twi.c", spi / "SPI.cpp"]
-    words = ["avr-gcc", *_AVR_OPTIONS, *(f"-I{place}" for place in places), *map(str, files), "-lm", "-o", str(program)]
-    _run(words)
+    _run(["avr-gcc", *_AVR_OPTIONS, *(f"-I{place}" for place in places), *map(str, files), "-lm", "-o", str(program)])
     return program
 
 
