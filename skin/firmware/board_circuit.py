@@ -22,7 +22,6 @@ from .boards import BUILT_IN, Board, BoardFacts, Converter, boards, converters, 
 
 _WIRE_OHMS = 1.0  # of the wire of an electrode, with bead, plug and foil
 _QUIET_BITS = 12  # with fewer, a converter without noise of its own reads the same count for ever
-_EXTRA_BITS = 1  # that the sketch's usual setting adds to the converter's: two conversions for a reading
 _BIAS_SHARE = 127.0 / 10127.0  # of 3.3 V, at the amplifier's reference pin
 _INPUT_OHMS = 470e3  # 25 nA of warm clamps and switches lift a guide that floats by 12 mV; over 10 Mohm by 250 mV
 PIN_OHMS = 30.0  #: of a controller's pin that holds a pull-down at ground, 25 to 40
@@ -61,7 +60,8 @@ class BoardCircuit(NamedTuple):
     def keys(self) -> dict[str, float | int | list[float]]:
         """What a sensor's table in a scene says of this board: it overrules the sensor's file."""
         parts = self.sensor.electronics
-        found: dict[str, float | int | list[float]] = {
+        return {
+            "adc_v": parts.adc_volts,
             "adc_bits": parts.adc_bits,
             "lead_ohm": [float(f"{ohms:g}") for ohms in parts.lead_ohms],
             "supply_v": parts.supply_volts,
@@ -70,7 +70,6 @@ class BoardCircuit(NamedTuple):
             "current_full_scale_ma": round(1e3 * parts.current_full_scale, 4),
             "current_zero_ma": round(1e3 * parts.current_zero, 6),
         }
-        return found if self.converter is None else {**found, "adc_v": parts.adc_volts}
 
     @property
     def monitoring(self) -> dict[str, float | int]:
@@ -195,7 +194,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     shunt, supply = shunt_ohms(sensor.electronics), sensor.electronics.supply_volts
     if supply != _FIXED_VOLTS:  # what a resistor of E96 at 100 uA gives
         supply = float(f"{10.0 ** (round(96.0 * math.log10(supply)) / 96.0):.3g}")
-    bits, volts, other = board.bits + _EXTRA_BITS, sensor.electronics.adc_volts, None
+    bits, volts, other = board.bits + 1, 3.3, None  # the sketch makes a reading of two conversions; 3.3 V at its AREF
     if converter == BUILT_IN and not board.sense:
         raise SensorError(
             f"the converter of an {facts.title} is dead below 0.14 V and bent by per cents, and places touches "
@@ -215,6 +214,8 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
         board = board._replace(sense=tuple(electrodes), current=current, supply=rail, select=(), common="")
         board = board._replace(pull_down=other.pull_down or board.pull_down)
         bits, volts = other.bits + other.extra_bits, other.volts
+    if supply > (highest := 0.94 * min(volts, facts.logic_volts)):  # of what reads it, with 6 % for tolerances
+        raise SensorError(f"{sensor.name}: supply_v is {supply:g}, the board takes {highest:.3g} V at most: lower it")
     ampere = 1.0 / (SENSE_GAIN * shunt)  # A for a volt
     lead, resistor = _WIRE_OHMS + limits["on_ohm"][0], sensor.electronics.pulldown_ohms
     inputs = max(_INPUT_OHMS, 10.0 * resistor)

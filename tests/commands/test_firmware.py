@@ -14,6 +14,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.commands.firmware import add_arguments
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.scene.reader import parse_scene
 from coneskin.skin.electronics import Electronics
@@ -358,3 +359,23 @@ def test_a_shunt_that_measured_sheets_make_too_large_is_warned_of(sensor_file, c
         assert ("R1 is too large for these sheets" in capsys.readouterr().out) == warned
         (share,) = re.findall(r"([\d.]+) times the larger one", (folder / "board.md").read_text(encoding="utf-8"))
         assert (float(share) < 2.0) == warned
+
+
+@pytest.mark.parametrize(("board", "converter", "highest"), [("pico", BUILT_IN, 3.1), ("esp32", "ads1115", 3.1)])
+def test_a_rail_that_would_destroy_what_reads_it_is_refused(board, converter, highest):
+    for volts in (3.0, 3.4, 5.0, 15.0):
+        parts = replace(Electronics(), supply_volts=volts, adc_volts=2.0 * volts)
+        sensor = Sensor(Frustum(0.0375, 0.0375, 0.24, 6.1), electronics=parts)
+        if volts < highest:
+            assert board_circuit(board, sensor, converter).keys["adc_v"] == (3.3 if converter == BUILT_IN else 4.096)
+            continue
+        with pytest.raises(SensorError, match=f"takes {highest} V at most"):
+            board_circuit(board, sensor, converter)
+
+
+def test_what_is_no_file_is_neither_read_nor_replaced(sensor_file, capsys):
+    (sensor_file.parent / "board").mkdir()
+    os.mkfifo(sensor_file.parent / "board" / "board.md")
+    for words in ((), ("--force",)):
+        assert write(sensor_file, *words)[0] == 1
+        assert "board.md would be replaced" in capsys.readouterr().err

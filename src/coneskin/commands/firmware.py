@@ -77,8 +77,8 @@ def run(args: argparse.Namespace) -> int:
     files[args.output / "parts.csv"] = circuit.part_list().encode()
     files[args.output / "board.net"] = circuit.kicad_netlist().encode()
     files[args.output / "board.md"] = board_page(circuit).encode()
-    there = [str(path) for path, data in files.items() if path.exists() and path.read_bytes() != data]
-    if there and not args.force:
+    there = [str(at) for at, data in files.items() if at.exists() and not (at.is_file() and at.read_bytes() == data)]
+    if there and not (args.force and all(Path(path).is_file() for path in there)):  # a FIFO is none
         raise GeometryError(
             f"{', '.join(there)} would be replaced: name another folder with -o, or replace them with --force"
         )
