@@ -142,15 +142,15 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
 
 def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
     numbers = seen.numbers()
-    rate = numbers.rate
+    rate, ratio = numbers.rate, numbers.clock_ratio
     enough = rate >= _LOW_RATE or rate * silence >= _FRAMES_PER_SILENCE
-    verdict: Verdict = "ok" if rate >= _GOOD_RATE else "warning" if enough else "bad"
+    good = rate >= (1.0 - max(_CLOCK_ERROR, drift)) * _GOOD_RATE  # as well as the device's clock knows it
+    verdict: Verdict = "ok" if good else "warning" if enough else "bad"
     remedy = "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
     found = [judged(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
     remedy = "the line is too slow or disturbed, or this computer too busy"
     value = f"{100.0 * numbers.missing:.1f} % of the frames"
     found.append(judged(f"{name}, lost", numbers.missing <= _MAX_LOST, value, "at most 2 %", remedy))
-    ratio = numbers.clock_ratio
     good = not abs(ratio - 1.0) > max(_CLOCK_ERROR, drift)
     verdict = "ok" if good else "warning" if numbers.hidden else "bad"
     remedy = "the frame's clock counts microseconds: correct the firmware's timer or prescaler"
