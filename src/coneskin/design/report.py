@@ -168,7 +168,7 @@ def _sheet_section(design: SheetDesign, folder: str) -> Iterator[str]:
             ["drive current, radial phase", f"{radial:.3f} mA, {radial / count:.0f} counts"],
             ["drive current, angular phase", f"{angular:.3f} mA, {angular / count:.0f} counts"],
             ["full scale of the current", f"{full_scale:.3f} mA"],
-            ["shunt", f"{shunt_ohms(parts):.3g} ohm, with an amplifier of {SENSE_GAIN:g} V/V"],
+            ["shunt", f"{shunt_ohms(parts):.3g} ohm, with an amplifier of {SENSE_GAIN:g} V/V; measure strips first"],
             ["pull-downs of C and D", f"{parts.pulldown_ohms / 1e3:g} kohm"],
         ],
     )
