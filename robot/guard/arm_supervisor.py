@@ -25,7 +25,7 @@ from coneskin.robot.stop.state_age import StateAge
 from .activation import ControllerNeeds
 from .phase import Act, Cue, Phase, Supervision, transition
 from .signals.contact import Contact, TouchRecord
-from .signals.journal import TOUCH_CAUSE, EventName, Outputs, emit
+from .signals.journal import SLIDER_HOLDS, TOUCH_CAUSE, EventName, Outputs, emit
 from .speed.speed_reduction import SpeedReduction
 
 if TYPE_CHECKING:  # a reaction that only stops loads neither
@@ -385,7 +385,8 @@ class ArmSupervisor:
         """Latch an arm that has kept standing for long enough, and report it."""
         stop = self._stop
         if stop.watch.confirmed or state.stopped_by_safety:
-            what = "the controller does not show the protective stop" if stop.unconfirmed(state) else ""
+            held = SLIDER_HOLDS if self.speed_reduction.halted and state.program_running else ""
+            what = "the controller does not show the protective stop" if stop.unconfirmed(state) else held
             self.supervision, _ = transition(self.supervision, Cue.LATCHES, what)
             emit(out, EventName.LATCHED, state.time, why=self.supervision.why, stop=self.supervision.stop)
             self._put_slider_back(state.time, out)

@@ -107,7 +107,7 @@ def _stops(host: str) -> list[Finding]:
     """Prove the stop paths as a guard does at its start."""
     start = time.monotonic()
     with StopSockets(host, _REPLY_TIMEOUT):
-        value = f"programs and commands are taken, in {1e3 * (time.monotonic() - start):.0f} ms"
+        value = f"secondary programs and commands are taken, in {1e3 * (time.monotonic() - start):.0f} ms"
         return [Finding("arm, stops", "ok", value)]
 
 

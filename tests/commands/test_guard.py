@@ -8,7 +8,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.core.errors import Collision, RobotConnectionError
-from coneskin.robot.guard.signals.journal import GuardEvent
+from coneskin.robot.guard.signals.journal import SLIDER_HOLDS, GuardEvent
 from coneskin.scene.reader import parse_scene
 from coneskin.session.outcome import exit_code, stands
 from coneskin.session.session import _defer_interrupts
@@ -120,6 +120,7 @@ def events(*names):
             "stopping": {"why": more},
             "ending": {"what": "told to end"},
             "fallback_stop": {"stands": more == "yes"},
+            "latched": {"why": more},
         }
         reported.append(GuardEvent(word, 1.0, details.get(word, {"what": "?"})))
     return reported
@@ -220,6 +221,19 @@ def test_ctrl_c_keeps_the_exit_code_and_says_what_is_known(command, reported, at
 
 def collide(session):
     raise Collision("the cuff was touched")
+
+
+def test_an_arm_that_only_the_slider_holds_under_a_program_is_said_to_be_held_so(command):
+    """Who raises the slider after the guard has ended would move the arm."""
+    held = f"latched: the stop path is lost; {SLIDER_HOLDS}"
+    _, words = command(["activated", "stopping: the stop path is lost", held], [], interrupt)
+    assert words.endswith(f"the arm stands; {SLIDER_HOLDS}\n")
+    assert "the speed slider at 0" in words
+    assert "end the program before" in words
+    _, words = command(
+        ["activated", "stopping: x", held, "reset", "activated", "stopping: y", "latched: y"], [], interrupt
+    )
+    assert SLIDER_HOLDS not in words
 
 
 HANGS = RobotConnectionError("the guard hangs")

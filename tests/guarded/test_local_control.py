@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from coneskin.core.errors import RobotRefused
+from coneskin.robot.guard.signals.journal import SLIDER_HOLDS
 from coneskin.session.session import guard
 from tests.support.scenes import START
 
@@ -30,6 +31,7 @@ def test_a_switch_to_local_control_stops_the_arm_and_says_why():
         until(lambda: fast(controller))
         controller.call("local control")
         assert session.wait_for(("latched",), DEADLINE) is not None
+        assert session.events[-1].details["why"].endswith(SLIDER_HOLDS)  # who raises it now moves the arm
         controller.wait_for_standstill()
         assert "local control" in next(event for event in session.events if event.name == "stopping").details["why"]
         controller.call("remote control")  # what was connected in local control stays read-only (C210): start again

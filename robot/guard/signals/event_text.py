@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from coneskin.core.text import printable
@@ -69,7 +69,7 @@ def _words(event: GuardEvent) -> str:
                 f"decelerating: {d['speed']:.3f} rad/s" if d["speed"] >= _STANDSTILL_SPEED else "the arm moves no more"
             )
         case EventName.STANDSTILL:
-            text = f"standstill: {d['speed']:.4f} rad/s, by {_paths(d['paths'])}"
+            text = f"standstill: {d['speed']:.4f} rad/s; stop paths tried: {', '.join(d['paths'])}"
         case EventName.RETREATED:
             gave_way = d.get("how") == "push" or d["why"] == _RELEASE_CAUSE
             text = f"{describe_way({**d, 'how': 'push'} if gave_way else d)}: {d['why']}"
@@ -138,9 +138,3 @@ def _force(details: Mapping[str, Any]) -> str:
         return ", lighter or firmer than the forces of the calibration"
     force, deviation = details["force"]
     return f", {force:.1f} N +- {2.0 * deviation:.1f} N"
-
-
-def _paths(names: Sequence[str]) -> str:
-    """Return a list of stop paths as part of a sentence."""
-    *rest, last = names
-    return f"the paths {', '.join(rest)} and {last}" if rest else f"the path {last}"

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: ``why`` of a stop for a touch; what else is there stops the arm without a ``Collision``
 TOUCH_CAUSE = "touch"
+#: ends the ``why`` of an arm that is latched under a program that no stop has ended
+SLIDER_HOLDS = "the speed slider at 0 alone holds a program that runs: end the program before anyone raises the slider"
 
 
 class BlockKind(IntEnum):

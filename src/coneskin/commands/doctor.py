@@ -8,9 +8,9 @@ example:
 
 Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
 mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
-something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes or
-lacks something. Without a valid commissioning record a guard can start, so that is 0 as well. The arm then only stops,
-and the last line says so.
+something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes, lacks
+something, or --measured shows what is bad. Without a valid commissioning record a guard can start, so that is 0 as
+well. The arm then only stops, and the last line says so.
 """
 
 from __future__ import annotations
@@ -59,8 +59,6 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
-    if args.check:
-        return _check(scene, args.json)
     from coneskin.commissioning.examination.examination import Doctor
 
     def tell(finding: Finding) -> None:
@@ -77,6 +75,8 @@ def run(args: argparse.Namespace) -> int:
 
         limits, hz = scene.monitoring_limits, scene.arm.watchdog_hz if scene.arm else math.inf
         doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget, hz))
+    if args.check:
+        return max(_check(scene, args.json), *(int(finding.verdict == "bad") for finding in doctor.findings), 0)
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
     code = 1 if any(finding.verdict == "bad" for finding in doctor.findings) else 0

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import Collision, ConeSkinError, RobotRefused
 from coneskin.core.text import positive_seconds
-from coneskin.robot.guard.signals.journal import EventName
+from coneskin.robot.guard.signals.journal import SLIDER_HOLDS, EventName
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 
 from .simulated_arm import simulated_arm
@@ -103,8 +103,8 @@ def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPub
     except KeyboardInterrupt:
         print(f"coneskin guard: ended by you; {_last_words(session)}", file=sys.stderr)
     else:
-        if scene.arm is not None and not stands(session.events):
-            print(f"coneskin guard: {_last_words(session)}", file=sys.stderr)
+        if scene.arm is not None and (words := _last_words(session)) != STANDS:
+            print(f"coneskin guard: {words}", file=sys.stderr)
     if session.recording and session.recording.exists() and not args.json:  # none of a guard that did not start
         print_hint(f"next: coneskin replay {shlex.quote(str(session.recording))} --events")
     return max(work.code, exit_code(session.events, scene.arm is not None))
@@ -116,7 +116,10 @@ def _last_words(session: Session) -> str:
         return "there is no arm in the scene"
     if not any(event.name == EventName.ACTIVATED for event in session.events):
         return "the guard was not active yet, and has not moved the arm"
-    return STANDS if stands(session.events) else f"{NOT_CONFIRMED}: look at the arm"
+    if not stands(session.events):
+        return f"{NOT_CONFIRMED}: look at the arm"
+    latched = [str(event.details.get("why")) for event in session.events if event.name == EventName.LATCHED]
+    return f"{STANDS}; {SLIDER_HOLDS}" if latched and latched[-1].endswith(SLIDER_HOLDS) else STANDS
 
 
 class _Work:

@@ -28,7 +28,7 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
     "decelerating": ({"speed": 0.81234}, "decelerating: 0.812 rad/s"),
     "standstill": (
         {"speed": 0.001, "paths": ["driver", "command"]},
-        "standstill: 0.0010 rad/s, by the paths driver and command",
+        "standstill: 0.0010 rad/s; stop paths tried: driver, command",
     ),
     "escalated": ({"path": "command"}, "no deceleration: escalating to the command path"),
     "stop_failed": (

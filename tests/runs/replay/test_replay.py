@@ -252,8 +252,8 @@ def test_an_event_without_a_partner_does_not_move_the_others() -> None:
     both = [STANDING, ended]
     assert list(event_differences(both, both, 100.0)) == []
     (line,) = event_differences([ended], both, 100.0)
-    assert line == "2.0000 s  standstill: 0.0010 rad/s, by the path driver: is new"
+    assert line == "2.0000 s  standstill: 0.0010 rad/s; stop paths tried: driver: is new"
     assert list(event_differences([STANDING], [ended], 100.0)) == [
-        "2.0000 s  standstill: 0.0010 rad/s, by the path driver: "
+        "2.0000 s  standstill: 0.0010 rad/s; stop paths tried: driver: "
         "replayed as 3.0000 s  ending: the guard was told to end"
     ]
