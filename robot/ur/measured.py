@@ -1,8 +1,7 @@
 """What scripts/measure_controller.py has measured on one controller: read from its file, and compared with a scene.
 
-A guard assumes that a stop shows within ``escalate_ms``, that the arm brakes as it is told, and that the controller's
-watchdog ends a program soon after its period. Where that does not hold, each finding names the key to set. A stop that
-is a program shows before it starts: its arrival ends the program that moves the arm.
+A guard assumes that a stop shows within ``escalate_ms`` (a program that arrives ends the one that moves the arm), that
+the arm brakes as it is told, and that the watchdog ends a program soon after its period. Else findings name the key.
 """
 
 from __future__ import annotations

@@ -79,7 +79,10 @@ class Doctor:
     def examine(self) -> None:
         """Examine everything that the scene names, and meanwhile the computer."""
         with begin_measurement(self._hold_up_time) if self._hold_up_time else nullcontext() as measurement:
-            self.note(*_packages(self.scene))
+            missing, remedy = missing_packages(self.scene)
+            there = ", ".join(required_packages(self.scene).values()) or "none needed"
+            value = f"{', '.join(missing)} missing" if missing else there
+            self.note(Finding("packages", "bad" if missing else "ok", value, "", remedy if missing else ""))
             self.note(*(one for one in suspicions(self.scene) if one.item != "packages"))
             self._examine_source()
             if self.scene.arm is None:
@@ -172,15 +175,6 @@ class Doctor:
             self.note(examine_touches(sensor, untouched.frames, kept, 1.0 / untouched.numbers().rate))
         else:
             self.note(Finding(f"{sensor.name}, chi-squared", "not tried", "the wires are not in order"))
-
-
-def _packages(scene: Scene) -> Iterator[Finding]:
-    """Name all packages together that the scene needs and that are not installed."""
-    missing, remedy = missing_packages(scene)
-    if missing:
-        yield Finding("packages", "bad", f"{', '.join(missing)} missing", "", remedy)
-    else:
-        yield Finding("packages", "ok", ", ".join(required_packages(scene).values()) or "none needed")
 
 
 def _port(source: SourceScene) -> Iterator[Finding]:
