@@ -380,16 +380,25 @@ def main() -> int:
         rig = Rig(args.host, args.model)
         facts["version"] = rig.version
         print("no motion: program start, secondary program, watchdog")
-        facts["start_s"] = measure_start(rig, args.repeat)
-        facts["secondary_s"] = measure_secondary(rig, args.repeat)
-        facts["watchdog_s"] = measure_watchdog(rig, args.repeat)
+        for key, measure in (
+            ("start_s", measure_start),
+            ("secondary_s", measure_secondary),
+            ("watchdog_s", measure_watchdog),
+        ):
+            facts[key] = measure(rig, args.repeat)
+            print(f"  {key[:-2]}: {1e3 * facts[key]['p50']:.0f} ms (p50), {1e3 * facts[key]['worst']:.0f} ms (worst)")
         if args.switch:
             facts["switch"] = measure_switch(rig)
+            print("  switch: " + ", ".join(f"{key} {value}" for key, value in facts["switch"].items()))
         for stop in measure_stops(rig, args, ask):
             facts["stops"].append(stop)
         if args.protective and ask("joint 6 turns by up to 10 deg, and the arm ends in a protective stop"):
             rig.go_home()
             facts["protective"] = measure_protective(rig)
+            print(
+                "  protective: " + ", ".join(f"{k[:-2]} after {1e3 * v:.0f} ms" for k, v in facts["protective"].items())
+            )
+            print("the arm is in a protective stop: unlock it on the pendant")
         facts["complete"] = True
     except (ConeSkinError, Stuck, KeyboardInterrupt) as exc:
         print(f"ended: {exc or type(exc).__name__}", file=sys.stderr)
