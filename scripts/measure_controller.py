@@ -21,7 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.errors import ConeSkinError
+from coneskin.core.errors import ConeSkinError, RobotRefused
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import StopPath
 from coneskin.robot.ur.input_writers import HeartbeatRegisters, RtdeSpeedSlider, decode_fraction, heartbeat_lines
@@ -308,9 +308,22 @@ def measure_watchdog(rig: Rig, repeat: int) -> dict[str, float]:
     return summary(found)
 
 
+def in_local_control(host: str) -> bool:
+    """Tell whether new connections are refused because the controller is in local control."""
+    try:
+        StopSockets(host).__enter__().close()
+    except RobotRefused as exc:
+        if "local control" not in str(exc):
+            raise
+        return True
+    return False
+
+
 def measure_switch(rig: Rig) -> dict[str, object]:
     """Return what a controller in local control takes; a person switches it."""
     answer("switch the pendant to Local Control, then press Enter ")
+    while not in_local_control(rig.host):
+        answer("it is still in Remote Control: switch it to Local Control, then press Enter ")
     rig.sockets.ask()
     wanted = rig.register % 1000 + 1
     rig.sockets.run(f"sec coneskin_marks():\n  write_output_integer_register({_REGISTER}, {wanted})\nend\n")
@@ -321,6 +334,8 @@ def measure_switch(rig: Rig) -> dict[str, object]:
         said += [why for _, _, why in rig.sockets.drain()]
     taken = rig.register == wanted
     answer("switch it back to Remote Control, then press Enter ")
+    while in_local_control(rig.host):
+        answer("it is still in Local Control: switch it back to Remote Control, then press Enter ")
     rig.sockets.close()
     rig.sockets = StopSockets(rig.host).__enter__()
     return {"program_taken": taken, "seen": bool(said), "new_connections_work": True}
