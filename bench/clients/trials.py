@@ -80,7 +80,8 @@ def show(trials: Iterable[Trial]) -> None:
     heads = {"pass": "first try", "later": "later", "fail": "fail", "skip": "skipped", "apart": "has its own server"}
     rows = [[client, *(count[name] for name in heads)] for client, count in counts.items()]
     report.show(title, ["client", *heads.values()], rows)
-    report.show("not at the first try", ["client", "test", "result", "whose fault, and the evidence"], rest)
+    if rest:
+        report.show("not at the first try", ["client", "test", "result", "whose fault, and the evidence"], rest)
 
 
 _IN_OWN_NETWORK = "UR_CLIENTS_IN_OWN_NETWORK"  # environment variable that says so
