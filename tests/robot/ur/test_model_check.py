@@ -52,6 +52,7 @@ def test_where_no_controller_answers_the_message_says_what_to_check(listens):
     """No server, or one that is no controller, such as a proxy."""
     host = free_host()
     with socket.socket() as sock:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # an earlier test's connections may linger there
         sock.bind((host, 30004))
         if listens:
             sock.listen()
