@@ -154,7 +154,6 @@ def test_a_taken_port_is_one_line_that_names_it(capfd: pytest.CaptureFixture[str
     host = free_host()
     with socket.socket() as taken:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # an earlier test may just have left the port
-        taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         taken.bind((host, 29999))
         taken.listen()
         assert main(["--host", host]) == 1
