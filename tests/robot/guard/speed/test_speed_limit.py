@@ -139,7 +139,7 @@ def test_the_ratio_is_that_of_the_jacobian(q: list[float], qd: list[float]) -> N
         rows = point_jacobian(MODEL, q, LINK, patch.point)
         normal = link_pose(MODEL, q, LINK).rotate(patch.normal)
         speed = sum(n * sum(j * v for j, v in zip(row, qd, strict=True)) for n, row in zip(normal, rows, strict=True))
-        if speed > 1e-9:
+        if speed > 0.0:
             lever = min(speed / leading, 0.8)
             points = zip((0.0, *LEVERS), (0.0, *CURVE), LEVERS, CURVE, strict=False)
             allowed = next(a + (b - a) * (lever - x) / (y - x) for x, a, y, b in points if lever <= y)
