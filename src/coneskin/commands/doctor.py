@@ -9,8 +9,7 @@ example:
 Nothing is moved, and nothing is guarded. What is not there is not tried, and said to be. Where exchanged wires can be
 mended by the scene, the change is shown and made after a "y" (--yes makes it unasked). Exit code: 0 nothing is bad, 1
 something is, or was mended: run it again. With --check: 0 a guard can start with this scene, 1 it has mistakes, lacks
-something, or --measured shows what is bad. Without a valid commissioning record a guard can start, so that is 0 as
-well. The arm then only stops, and the last line says so.
+something, or --measured shows what is bad. Without a valid commissioning record it is 0 too: the arm then only stops.
 """
 
 from __future__ import annotations
@@ -59,24 +58,29 @@ def run(args: argparse.Namespace) -> int:
     from coneskin.scene.reader import load_scene
 
     scene = load_scene(args.scene)
-    from coneskin.commissioning.examination.examination import Doctor
+    measured: list[Finding] = []
 
     def tell(finding: Finding) -> None:
         verdict = painted(finding.verdict, _VERDICT_COLORS[finding.verdict], sys.stdout)
         said = finding.text.replace(finding.verdict, verdict, 1)
         print(json.dumps(asdict(finding)) if args.json else said, flush=True)
 
-    def ask(words: str) -> None:
-        print(f"       >>  {words}", file=sys.stderr, flush=True)
-
-    doctor = Doctor(scene, tell, ask, not args.no_touches, hold_up_time=_HOLD_UP_TIME)
     if args.measured:
         from coneskin.robot.ur.measured import compare, read_measured
 
         limits, hz = scene.monitoring_limits, scene.arm.watchdog_hz if scene.arm else math.inf
-        doctor.note(*compare(read_measured(args.measured), limits.escalate, limits.stop_budget, hz))
+        measured += compare(read_measured(args.measured), limits.escalate, limits.stop_budget, hz)
     if args.check:
-        return max(_check(scene, args.json), *(int(finding.verdict == "bad") for finding in doctor.findings), 0)
+        for finding in measured:
+            tell(finding)
+        return max(_check(scene, args.json), *(int(finding.verdict == "bad") for finding in measured), 0)
+    from coneskin.commissioning.examination.examination import Doctor
+
+    def ask(words: str) -> None:
+        print(f"       >>  {words}", file=sys.stderr, flush=True)
+
+    doctor = Doctor(scene, tell, ask, not args.no_touches, hold_up_time=_HOLD_UP_TIME)
+    doctor.note(*measured)
     with simulated_arm(scene) if args.simulated and scene.arm else contextlib.nullcontext():
         doctor.examine()
     code = 1 if any(finding.verdict == "bad" for finding in doctor.findings) else 0

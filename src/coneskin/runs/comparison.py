@@ -20,6 +20,7 @@ from .replay.event_details import Tolerances, describe_differences, distance, mi
 
 _MOST_LISTED = 40  # differences
 _STOP_WINDOW = 0.5  # s between a contact and the stop that is made for it
+_PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
 _EVENT_WORDS: Mapping[str, str] = {
     EventName.CONTACT: "touch",
     EventName.CONTACT_LOCATED: "located",
@@ -31,11 +32,7 @@ _EVENT_WORDS: Mapping[str, str] = {
     EventName.RETREATED: "end of the retreat",
     EventName.DECELERATING: "deceleration",
 }
-
-
 _EventPair = tuple[GuardEvent | None, GuardEvent | None]
-
-_PAIR_WINDOW = 0.5  # s that an event may move and still be the same one
 
 
 def _pair_events(one: Sequence[GuardEvent], other: Sequence[GuardEvent]) -> list[_EventPair]:
@@ -288,9 +285,8 @@ def _differences(pairs: Sequence[_EventPair], tolerances: Tolerances) -> list[Di
     subjects = _pair_subjects(pairs)
     found: dict[str, Difference] = {}
     # a stop is told after its contact, whose event follows it
-    stops_last = sorted(
-        zip(pairs, subjects, strict=True), key=lambda it: _either_event(it[0]).name == EventName.STOPPING
-    )
+    told = zip(pairs, subjects, strict=True)
+    stops_last = sorted(told, key=lambda it: _either_event(it[0]).name == EventName.STOPPING)
     for (a, b), subject in stops_last:
         before = found.get(subject, Difference(subject, ()))
         words, moved, delay = _words(a, b, tolerances)
