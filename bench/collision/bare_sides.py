@@ -220,7 +220,7 @@ def play(seed: int, way: str, bare_side: str) -> tuple[CollisionRun, Row]:
             now.append(sum(contact.force for contact in mine))
             forces[part] = max(forces[part], now[part])
             for contact in mine:
-                gave = 0.0 if run.plant.parts[part].acts else dot(minus(place, began), contact.normal)
+                gave = 0.0 if run.plant.parts[part].acts else float(contact.normal @ minus(place, began))
                 depths[part] = max(depths[part], contact.depth + gave)
         since, (period, newtons, length) = run.now - run.meter.began, REST
         if not run.latched or since < AT_REST or since - seen[0] < period:
