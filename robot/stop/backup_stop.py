@@ -172,9 +172,9 @@ class StandstillHold:
         self._stop.escalate(self._clock(), self)
         return False
 
-    def states_missing(self, at_least: float = _CONNECT_TIMEOUT) -> bool:
-        """Tell whether no new state has come for so long that the arm's motion is unknown; not before a time [s]."""
-        return self._age.silent(self._clock(), max(2.0 * self._limits.arm_silence, at_least))
+    def states_missing(self, time: float = 0.0) -> bool:
+        """Tell whether no new state has come for a time [s], or else so long that the arm's motion is unknown."""
+        return self._age.silent(self._clock(), time or max(2.0 * self._limits.arm_silence, _CONNECT_TIMEOUT))
 
     def _reconnect(self) -> None:
         """Open what is missing; where a stop path comes back, a stop goes through it."""

@@ -64,7 +64,7 @@ class _GuardWatchdog:
         self._clock = clock
         self._heard: float | None = None  # None until the guard's first heartbeat
         self._alone = False  # the guard is gone, or hangs
-        self._beaten = -math.inf
+        self._beaten = clock()  # last
 
     def run(self) -> None:
         """Serve until the guard has left and the arm stands."""
@@ -78,11 +78,11 @@ class _GuardWatchdog:
             inputs.append(reader)
         wait_readable(inputs, timeout)
         now, hold = self._clock(), self._hold
+        if LEAVE in self._session.receive() or self._session.closed:
+            self._left_at = min(self._left_at, self._beaten)  # what was opened since may have taken long
         if now - self._beaten >= BEAT_PERIOD:
             self._beaten = now
             self._guard.send(self._sign)
-        if LEAVE in self._session.receive() or self._session.closed:
-            self._left_at = min(self._left_at, now)
         for message in self._guard.receive():
             self._heard, self._alone = now, False
             match decode_command(message):
@@ -95,6 +95,11 @@ class _GuardWatchdog:
         gone = self._guard.closed
         if gone:
             self._gone_at = min(self._gone_at, now)
+        alone, unseen = now - self._gone_at, now - self._left_at
+        if alone > _LONELY_TIME and unseen > _ORPHAN_TIME and hold.states_missing(unseen) and not hold.rest():
+            if hold.stopping:  # nothing was said of this stop yet
+                self._session.send(encode_json({"stands": False}))
+            return False
         if hold.stopping or (self._alone and self._asked is None):
             outcome = hold.poll()
             if outcome and self._alone:  # tell the program whether the arm stands, where that is known now
@@ -111,11 +116,6 @@ class _GuardWatchdog:
             what = f"the guard was silent for {self._patience:g} s, the arm was stopped"
             self._guard.send(StatusReport("error", what).encode())
             hold.begin()
-        alone, unseen = now - self._gone_at, now - self._left_at
-        if alone > _LONELY_TIME and unseen > _ORPHAN_TIME and hold.states_missing(unseen):
-            if hold.stopping:  # nothing was said of this stop yet
-                self._session.send(encode_json({"stands": False}))
-            return False
         return hold.stopping or not (gone and self._left_at < math.inf and (hold.stands or hold.failed))
 
 
