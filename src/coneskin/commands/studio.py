@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show the studio."""
     from coneskin.design.link_design import load_link
-    from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
+    from coneskin.design.studio.studio_page import StudioPage
     from coneskin.design.studio.workbench import RobotLinks, Workbench
     from coneskin.view.page_server import PageServer
 
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         return Workbench.of(link, tolerance=1e-3 * args.tolerance_mm)
 
     urdf = urdf_options(args)
-    with PageServer("coneskin studio", port=args.port, uploads=FILE_DROP) as server:
+    with PageServer("coneskin studio", port=args.port, uploads=True) as server:
         shown: Workbench | RobotLinks
         if args.link.lower().endswith((".urdf", ".xacro")):
             shown = RobotLinks(args.link, bench_of, **urdf)

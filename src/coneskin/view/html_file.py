@@ -16,7 +16,7 @@ from typing import Any
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import explain_os_error, write_whole
 
-from .page_server import PageServer, page_client
+from .page_server import PageServer, browser_text, page_client
 from .panel import NOTICE, PAGE_LEGEND, state_of, status, timeline, trace_drawings
 from .run_course import RunCourse, event_lines
 from .stage.level_scale import level_bars, level_words
@@ -31,87 +31,6 @@ _MAX_PICTURES = 6000  # ... but not more than these in a file
 _MAX_EVENTS = 3000  # in a file, each with a picture of its own ...
 _EVENT_DELAY = 1e-6  # ... so long after it [s]
 _PAGE_BEGIN = b"<!doctype html"  # of every page
-
-_PAGE_STYLE = """
-body #root{width:calc(100% - 384px);overflow:hidden;transform:translateZ(0)}
-#coneskin{position:fixed;top:12px;right:12px;width:360px;max-height:calc(100% - 24px);overflow:auto;z-index:9;
-background:rgba(255,255,255,.93);font:13px system-ui,sans-serif;box-shadow:0 1px 8px rgba(0,0,0,.25);padding:10px}
-#coneskin-timeline{cursor:pointer}
-@media(max-width:700px){body #root{width:100%;height:45%}
-#coneskin{left:0;right:0;top:45%;bottom:0;width:auto;max-height:none}}
-#root .mantine-NumberInput-root,#root .mantine-Slider-label{display:none}
-"""  # the client's own field and label count from the first picture, which is not where the run's clock has its zero
-
-#: moves the client's own playback by its field for the time, and follows what its slider shows
-_PAGE_SCRIPT = """
-(function () {
-  const data = JSON.parse(document.getElementById('coneskin-data').textContent);
-  const panel = document.getElementById('coneskin');
-  const head = document.getElementById('coneskin-head');
-  const clock = document.getElementById('coneskin-clock');
-  const list = document.getElementById('coneskin-events');
-  const cursors = [...panel.querySelectorAll('.coneskin-cursor')];
-  const levels = [...panel.querySelectorAll('.coneskin-level')];
-  const marks = [...panel.querySelectorAll('.coneskin-level-mark')];
-  const forces = [...panel.querySelectorAll('.coneskin-force b')];
-  const rows = data.events.map((event) => {
-    const row = document.createElement('div');
-    row.textContent = event[1];
-    row.tabIndex = 0;
-    row.onclick = () => jump(event[0]);
-    list.appendChild(row);
-    return row;
-  });
-  function field() { return document.querySelector('#root input:not([role=slider])'); }
-  function shown() {
-    const thumb = document.querySelector('#root [role=slider]');
-    return thumb === null ? null : parseFloat(thumb.getAttribute('aria-valuenow'));
-  }
-  function jump(time) {
-    const input = field();
-    if (input === null) return;
-    const setter = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value').set;
-    const steps = Math.min(Math.max(Math.ceil(1e4 * time), 1), Math.floor(1e4 * data.duration));  // of its slider
-    setter.call(input, (1e-4 * steps).toFixed(4));
-    input.dispatchEvent(new Event('input', { bubbles: true }));
-    input.dispatchEvent(new Event('blur', { bubbles: true }));
-  }
-  const timeline = document.getElementById('coneskin-timeline');
-  timeline.onclick = (event) => {
-    const box = timeline.getBoundingClientRect();
-    jump(data.duration * (event.clientX - box.left) / box.width);
-  };
-  function last(changes, time) {
-    let found = changes[0];
-    for (const change of changes) { if (change[0] <= time + 1e-4) found = change; else break; }
-    return found;
-  }
-  let before = null;
-  function follow() {
-    const time = shown();
-    if (time !== null && time !== before) {
-      before = time;
-      clock.textContent = (1e-3 * Math.floor(1e3 * (time + data.since))).toFixed(3) + ' s';
-      cursors.forEach((cursor) => { cursor.style.left = (100 * time / data.duration) + '%'; });
-      const words = last(data.heads, time)[1];  // from Python, which has escaped what a recording says
-      if (head.innerHTML !== words) head.innerHTML = words;
-      let bar = 0, pressed = 0;
-      data.runs.forEach((run) => {
-        run.levels.forEach((changes, sheet) => {
-          const level = last(changes, time)[1];
-          levels[bar].textContent = run.words[sheet][level];
-          marks[bar].style.left = level + '%';
-          bar += 1;
-        });
-        if (run.forces.length > 0) { forces[pressed].textContent = last(run.forces, time)[1]; pressed += 1; }
-      });
-      rows.forEach((row, k) => { row.style.opacity = data.events[k][0] <= time + 1e-4 ? 1 : 0.4; });
-    }
-    requestAnimationFrame(follow);
-  }
-  follow();
-})();
-"""
 
 
 def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
@@ -136,7 +55,7 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
     scene = _serialized(courses, since, pictures)
     embedded = base64.b64encode(scene).decode("ascii")
     head = (
-        f"<title>coneskin: {escape(courses[0].stage.title)}</title><style>{_PAGE_STYLE}</style>"
+        f"<title>coneskin: {escape(courses[0].stage.title)}</title><style>{browser_text('file.css')}</style>"
         f'<script>window.__VISER_EMBED_DATA__="{embedded}";window.__VISER_EMBED_CONFIG__={{darkMode:false}};</script>'
     )
     page = page_client().replace("</head>", f"{head}</head>", 1)
@@ -219,7 +138,7 @@ def _panel(courses: Sequence[RunCourse], since: float, until: float, pictures: S
         f'<div id="coneskin">{NOTICE}{title}<div id="coneskin-head"></div><div id="coneskin-clock"></div>'
         f"{timeline(courses, since, until)}"
         f'{"".join(bars)}{trace_drawings(courses, since, until)}<div id="coneskin-events"></div>{PAGE_LEGEND}</div>'
-        f'<script type="application/json" id="coneskin-data">{text}</script><script>{_PAGE_SCRIPT}</script>'
+        f'<script type="application/json" id="coneskin-data">{text}</script><script>{browser_text("file.js")}</script>'
     )
 
 

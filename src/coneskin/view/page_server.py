@@ -15,7 +15,6 @@ from typing import Any
 from coneskin.core.errors import ConeSkinError, MissingExtra
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
-from .page_script import PANEL_HEAD
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 _MAX_UPLOAD_SIZE = 200_000_000  # bytes of a message, where files may be dropped
@@ -31,17 +30,25 @@ def _viser() -> Any:
     return viser
 
 
-def page_client(head: str = PANEL_HEAD) -> str:
+def browser_text(name: str) -> str:
+    """Return a style sheet or a script of a page, from the files beside this one."""
+    return (Path(__file__).with_name("browser") / name).read_text(encoding="utf-8")
+
+
+def page_client(uploads: bool = False) -> str:
     """Return the HTML of viser's client, whose head begins with style and scripts of the panel.
 
     Args:
-        head: what it begins with.
+        uploads: files may be dropped onto the page.
 
     Raises:
         MissingExtra: viser is not installed.
     """
     client = Path(_viser().__file__).parent / "client" / "build" / "index.html"
-    return client.read_text(encoding="utf-8").replace("<head>", f"<head>{head}", 1)
+    names = ["plain_edges.js", "panel.js", *(["file_drop.js"] if uploads else [])]
+    scripts = "".join(f"<script>{browser_text(name)}</script>" for name in names)
+    head = f"<head><style id=coneskin-style>{browser_text('panel.css')}</style>{scripts}"
+    return client.read_text(encoding="utf-8").replace("<head>", head, 1)
 
 
 class PageServer:
@@ -51,7 +58,7 @@ class PageServer:
         title: of the page's panel.
         host: address to listen at; another than this computer's lets its network look in.
         port: to listen at; the next free one where it is taken.
-        uploads: for the head of a page onto which files may be dropped; empty: none may.
+        uploads: files may be dropped onto the page.
 
     Attributes:
         gate: in front of it.
@@ -66,7 +73,7 @@ class PageServer:
         ConeSkinError: the address cannot be listened at, or there is no such port.
     """
 
-    def __init__(self, title: str, host: str = "127.0.0.1", port: int = 8080, uploads: str = "") -> None:
+    def __init__(self, title: str, host: str = "127.0.0.1", port: int = 8080, uploads: bool = False) -> None:
         if not 0 < port < 65536:  # viser would try a thousand ports beyond
             raise ConeSkinError(f"--port must be 1 to 65535, got {port}")
         viser = _viser()
@@ -80,7 +87,7 @@ class PageServer:
 
         hosts = LOOPBACK | {host} if host in LOOPBACK else None
         allowed = ALLOWED | UPLOADS if uploads else ALLOWED
-        page = page_client(uploads + PANEL_HEAD)
+        page = page_client(uploads)
         self.gate = ConnectionGate(decode, hosts, page, allowed, **({"largest": _MAX_UPLOAD_SIZE} if uploads else {}))
         _check_address(host)
         with _starting, _gated(self.gate), contextlib.redirect_stdout(io.StringIO()):

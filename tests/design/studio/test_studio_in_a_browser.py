@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from coneskin.design.link_design import LinkMesh
-from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
+from coneskin.design.studio.studio_page import StudioPage
 from coneskin.design.studio.workbench import Workbench
 from coneskin.view.page_server import PageServer
 from tests.geometry.synthetic import placed, revolve
@@ -34,7 +34,7 @@ def test_a_mesh_is_put_onto_the_page_by_the_button(tmp_path: Path) -> None:
     other = tmp_path / "tube.stl"
     trimesh.creation.cylinder(radius=0.06, height=0.15, sections=48).export(other)
     link = LinkMesh("link", placed(revolve([(0.0, 0.04), (0.2, 0.05)], segments=48, rings=6)), "mesh", ())
-    with PageServer("studio", port=18180, uploads=FILE_DROP) as server, browser_page() as page:
+    with PageServer("studio", port=18180, uploads=True) as server, browser_page() as page:
         StudioPage(server, Workbench.of(link), tmp_path / "skin", False, Workbench.of)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-facts", "theta0")
@@ -52,7 +52,7 @@ def test_a_person_designs_a_sheet_and_then_one_for_another_link(tmp_path: Path) 
     trimesh.creation.cylinder(radius=0.06, height=0.15, sections=48).export(other)
     folder = tmp_path / "skin"
     link = LinkMesh("link", mesh, "mesh", ())
-    with PageServer("studio", port=18180, uploads=FILE_DROP) as server, browser_page() as page:
+    with PageServer("studio", port=18180, uploads=True) as server, browser_page() as page:
         StudioPage(server, Workbench.of(link), folder, False, Workbench.of)
         page.goto(server.url)
         wait_for_text(page, "#coneskin-facts", "theta0")

@@ -13,7 +13,7 @@ from coneskin.cli import main
 from coneskin.core.errors import GeometryError
 from coneskin.design.link_design import LinkMesh, design_link
 from coneskin.design.studio.design_text import design_facts, deviation_bands, flat_drawing, robot_facts, warning_list
-from coneskin.design.studio.studio_page import FILE_DROP, StudioPage
+from coneskin.design.studio.studio_page import StudioPage
 from coneskin.design.studio.workbench import Handles, RobotLinks, Wish, Workbench, _adjusted
 from coneskin.geometry.bend import Bend
 from coneskin.geometry.developable import Developable
@@ -257,7 +257,7 @@ def test_the_studio_is_served_at_its_port_and_takes_files(monkeypatch: pytest.Mo
     server = Mock(side_effect=KeyboardInterrupt)
     monkeypatch.setattr("coneskin.view.page_server.PageServer", server)
     assert main(["studio", "link.stl", "--port", "8123"]) == 130
-    server.assert_called_once_with("coneskin studio", port=8123, uploads=FILE_DROP)
+    server.assert_called_once_with("coneskin studio", port=8123, uploads=True)
 
 
 def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench, tmp_path: Path) -> None:
@@ -268,7 +268,7 @@ def test_the_page_draws_says_what_it_did_and_takes_another_link(bench: Workbench
         other.append(link)
         return bench
 
-    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+    with PageServer("studio", port=18190, uploads=True) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, load)
         nodes = set(server.scene._handle_from_node_name)
         assert {"/link", "/sheets/sheet 1/A", "/sheets/sheet 1/B", "/sheets/sheet 1/C", "/sheets/sheet 1/D"} <= nodes
@@ -298,7 +298,7 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
             page._take_upload()
         return Workbench(link, bench.wish)
 
-    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+    with PageServer("studio", port=18190, uploads=True) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, load)
         page._upload = SimpleNamespace(value=SimpleNamespace(name="slow.stl", content=data))
         page._take_upload()
@@ -316,7 +316,7 @@ def test_two_sheets_over_one_another_leave_no_room_for_a_third(bench: Workbench)
 
 def test_what_was_sought_for_one_link_is_not_taken_for_another(bench: Workbench, tmp_path: Path) -> None:
     pytest.importorskip("viser", reason="viser is not installed: no page is served")
-    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+    with PageServer("studio", port=18190, uploads=True) as server:
         page = StudioPage(server, bench, tmp_path / "skin", False, lambda _: bench)
         other = Workbench(bench.link, bench.wish)
         page._change(lambda bench: bench.delete(0), of=other)
@@ -329,7 +329,7 @@ def test_a_folder_of_others_is_not_replaced_by_a_second_press(bench: Workbench, 
     own = tmp_path / "skin" / "design.json"
     own.parent.mkdir()
     own.write_text('{"name": "mine"}')
-    with PageServer("studio", port=18190, uploads=FILE_DROP) as server:
+    with PageServer("studio", port=18190, uploads=True) as server:
         page = StudioPage(server, bench, own.parent, False, lambda _: bench)
         page._written()
         assert "press again" in page._told.content
