@@ -263,8 +263,8 @@ class ArmSupervisor:
                 self._follow(state.time, Cue.FAULTED, why, out)
         elif phase is Phase.SLOWED:
             self.speed_reduction.sample(state, measured_at, self._touches.contacts)
-        elif stop.watch.moved(state, bool(self._touches.contacts)):
-            self._follow(state.time, Cue.MOVED, stop.watch.why, out)
+        elif why := stop.watch.moved(state, bool(self._touches.contacts)):
+            self._follow(state.time, Cue.MOVED, why, out)
         elif phase is Phase.PLACING:
             self._decide(state, self.supervision.decide_by, out)
         elif phase is Phase.STANDING:
@@ -285,7 +285,7 @@ class ArmSupervisor:
         elif phase is _SLOWED:
             slowed = self.speed_reduction.now
             if why := self.speed_reduction.poll(now, fair, bool(self._touches.contacts)):
-                contact = self._touches.find(0 if slowed is None else slowed.approach.exceeded)
+                contact = self._touches.find(0 if slowed is None else slowed.approach.exceeded[0])
                 self._follow(now, Cue.FAULTED, why, out, contact)
             elif slowed is None or slowed.over(now):
                 self._follow(now, Cue.FREED, "", out)

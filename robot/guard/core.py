@@ -20,7 +20,6 @@ from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.protocol import HeartbeatDriver, SliderDriver, require
 from coneskin.robot.stop.limits import MonitoringLimits
-from coneskin.skin.detection.detector import TouchAlarm
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
 from coneskin.skin.detection.stream import TouchStream
 
@@ -90,7 +89,6 @@ class GuardCore:
         self._limits = limits
         self._arm = arm
         self._not_commissioned = not_commissioned
-        self._phase = Phase.STARTING
         self._folding = EventFolding()
         self._companions = CompanionMonitor(limits, arm)
         self._clock = _StallClock()
@@ -101,7 +99,6 @@ class GuardCore:
         self._reopened = False  # the skin's port, and the guard has not been active since
         self._contacts: dict[str, Contact] = {}  # by sensor
         self._newest_number = 0
-        self._alarm: tuple[Outputs, TouchAlarm] | None = None  # and what it puts a stop into
         self._extended = 0  # number of the newest touch that was reported as not one disc
         self._located: set[str] = set()  # sensors whose touch had a certain place in its newest event
         self._feeders: dict[int, Callable[[Block, Outputs], None]] = {
@@ -126,7 +123,9 @@ class GuardCore:
     @property
     def phase(self) -> Phase:
         """Phase in which the guard is."""
-        return self._phase if self._arm is None else self._arm.phase
+        if self._arm is None:
+            return Phase.ACTIVE if self._activation.number else Phase.STARTING
+        return self._arm.phase
 
     @property
     def needs(self) -> ControllerNeeds:
@@ -173,11 +172,9 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
-        if self._alarm is None or self._alarm[0] is not out:  # the same one with every input
-            self._alarm = out, partial(self._stop, out)
         guarded = self._arm is not None and self._arm.supervision.phase is _ACTIVE
-        held_up = block.time - self._fair
-        for event in self._stream.feed(block.payload, block.time, self._alarm[1] if guarded else None, held_up):
+        alarm, held_up = partial(self._stop, out) if guarded else None, block.time - self._fair
+        for event in self._stream.feed(block.payload, block.time, alarm, held_up):
             self._feed_event(event, out)
         if self._contacts:
             self._update_contacts(block.time, out)
@@ -441,9 +438,7 @@ class GuardCore:
 
     def _activate(self, now: float, out: Outputs) -> None:
         self._reopened = False
-        if self._arm is None:
-            self._phase = Phase.ACTIVE
-        else:
+        if self._arm is not None:
             self._arm.activate()
         self._folding.flush(now, out)
         emit(out, EventName.ACTIVATED, now, request=self._activation.end())

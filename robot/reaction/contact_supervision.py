@@ -173,10 +173,9 @@ class ContactApproach:
 
     Attributes:
         speed: of the fastest touched surface, as last seen; where its place is not certain, of any point that the
-            joints below could move [m/s].
-        certain: True where that speed is the surface's own.
-        exceeded: number of the touch into which the surface has moved too far; 0 where there is none.
-        way: how far it would move into that one if it were stopped now [m].
+            joints below could move [m/s]. And whether it is the surface's own.
+        exceeded: number of the touch into which the surface has moved too far, 0 where there is none, and how far it
+            would move into that one if it were stopped then [m].
     """
 
     def __init__(self, model: ArmModel, q: Joints, qd: Joints, deceleration: float, press: float) -> None:
@@ -186,10 +185,8 @@ class ContactApproach:
         self._deceleration = deceleration
         self._press = press
         self._touches: dict[int, _Approach] = {}
-        self.speed = 0.0
-        self.certain = True
-        self.exceeded = 0
-        self.way = 0.0
+        self.speed = 0.0, True
+        self.exceeded = 0, 0.0
 
     def update(self, q: Joints, qd: Joints, contacts: Sequence[ContactOnLink]) -> None:
         """Take measured joint positions [rad] and speeds [rad/s], and the touches there are by their newest frames."""
@@ -214,14 +211,14 @@ class ContactApproach:
             else:
                 touch.blind += bound
             way = touch.made + self._stop(approach, qd)
-            if (way > self._press or touch.blind > _BLIND_RATIO * self._press) and not self.exceeded:
-                self.exceeded, self.way = contact.number, max(way, touch.blind)
+            if (way > self._press or touch.blind > _BLIND_RATIO * self._press) and not self.exceeded[0]:
+                self.exceeded = contact.number, max(way, touch.blind)
         if speeds:
-            self.speed = max(speeds)
-            self.certain = all(contact.location_valid for contact in contacts)
+            self.speed = max(speeds), all(contact.location_valid for contact in contacts)
         elif self._touches:  # nothing touches any more: what the arm is compared with is its own speed, in proportion
             before, now = max(map(abs, last_qd)), max(map(abs, qd))
-            self.speed = self.speed * now / before if before > 0.0 else self.speed
+            if before > 0.0:
+                self.speed = self.speed[0] * now / before, self.speed[1]
         self._last = q, qd
 
     def _begin(self, contact: ContactOnLink) -> _Approach:

@@ -126,7 +126,7 @@ class StandstillHold:
         if self.stopping:
             return self._continue(states, now)
         watch = self._stop.watch
-        moved = sum(watch.moved(state, True) for state, _ in states) > 0  # every state has to be taken
+        moved = "".join(watch.moved(state, True) for state, _ in states)  # every state has to be taken
         if self._began is not None and self.states_missing():
             if self._phase is _HoldPhase.CONFIRMED:
                 self._phase = _HoldPhase.STANDING

@@ -70,7 +70,6 @@ class StandstillWatch:
 
     Attributes:
         restarts: how often a program has moved the stopped arm.
-        why: what ended the newest watch.
     """
 
     def __init__(self, standstill: float) -> None:
@@ -78,7 +77,6 @@ class StandstillWatch:
         self._now: _Standstill | None = None
         self._crept = 0.0  # before this standstill, summed over the joints [rad]
         self.restarts = 0
-        self.why = ""
 
     @property
     def under_way(self) -> bool:
@@ -111,13 +109,13 @@ class StandstillWatch:
         self.end()
         self.restarts, self._crept = 0, 0.0
 
-    def moved(self, state: ControllerState, touched: bool) -> bool:
-        """Take a measured state and tell whether a program moves the arm, or is about to; then the watch is over.
+    def moved(self, state: ControllerState, touched: bool) -> str:
+        """Take a measured state and return what moves the arm, or is about to; then the watch is over. Else empty.
 
         ``touched`` while anything touches the skin.
         """
         if self._now is None:
-            return False
+            return ""
         now = self._now = self._now.after(state, touched, self._standstill)
         moves = (
             now.moving >= STANDSTILL_SAMPLES
@@ -125,9 +123,8 @@ class StandstillWatch:
             or now.crept > max(_POSITION_NOISE, _MAX_TOUCHED_DRIFT - self._crept)
         )
         if not moves and now.starts < _MAX_STARTS:
-            return False
+            return ""
         strongest = touched or not moves
         self.restarts = max(self.restarts + 1, _MAX_RESTARTS) if strongest else self.restarts + 1
-        self.why = "something moved the arm" if moves else "a program started again and again"
         self.end()
-        return True
+        return "something moved the arm" if moves else "a program started again and again"

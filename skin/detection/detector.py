@@ -77,7 +77,6 @@ class Detector:
     Attributes:
         sensor: the sensor.
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
-        touched: a touch lasts.
         reading_now: the newest valid frame while the sensor is touched, else None.
         timing: sequence and clocks, and counts of what was missing.
     """
@@ -91,7 +90,7 @@ class Detector:
                 f"{self.settings.drift_limit!r} and {sensor.thresholds.release_level!r}"
             )
         self.timing = FrameTiming(self.settings.timing)
-        self.ready = self.touched = False
+        self.ready = False
         self.reading_now: TouchReading | None = None
         self._fed = -math.inf
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
@@ -111,8 +110,12 @@ class Detector:
         self._told = ReportedTouch(sensor, self.settings)
         self._above = self._below = self._quiet = 0
         self._contradictions = 0.0  # frames taken for a change of contact, less what good frames have taken off
-        self._began = 0.0
-        self._lasting = False
+        self._began = 0.0  # the touch, until it is reported as one that lasts
+
+    @property
+    def touched(self) -> bool:
+        """True while a touch lasts."""
+        return self.reading_now is not None
 
     def age(self, now: float) -> float:
         """Return the time since the newest valid frame [s]. Infinite before the first."""
@@ -306,8 +309,7 @@ class Detector:
         touch = self._places.begin(frame, reading, level, now)
         if not certain:
             return
-        self.touched, self._lasting, self._began = True, False, now
-        self._below = 0
+        self._began, self._below = now, 0
         self.reading_now = touch
         events.append(self._told.begin(touch))
 
@@ -318,9 +320,9 @@ class Detector:
             return
         self.reading_now = touch
         self._below = 0
-        if not self._lasting and now - self._began >= self.settings.lasting_touch:
-            self._lasting = True
+        if now - self._began >= self.settings.lasting_touch:
             self._report(events, Fault.LAYERS_CLOSED, frame, now, f"{now - self._began:.1f} s")
+            self._began = math.inf
         moved = self._told.move(touch)
         if moved is not None:
             events.append(moved)
@@ -330,7 +332,7 @@ class Detector:
         self._below += 1
         if self._below < self.settings.release_frames:
             return
-        self.touched, self.reading_now = False, None
+        self.reading_now = None
         self._above = self._quiet = 0
         self._self_test.begin()
         self._places.end()

@@ -114,9 +114,8 @@ class ReportedTouch:
         self._sensor = sensor
         self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
         self._step, self._far = settings.level_step, settings.move_distance
-        self._level = self._u = self._phi = 0.0
+        self._told = 0.0, 0.0, 0.0, ""  # level, place and doubt
         self._placed = self._extended = False
-        self._doubt = ""
 
     def begin(self, touch: TouchReading) -> TouchBegan:
         """Return the event with which a touch begins.
@@ -135,17 +134,18 @@ class ReportedTouch:
         Args:
             touch: the frame, above the release threshold.
         """
-        valid, step = touch.location_valid, touch.level - self._level
+        level_told, u_told, phi_told, doubted = self._told
+        valid, step = touch.location_valid, touch.level - level_told
         shape = None if valid else touch.elongation
         if (
-            valid is not (not self._doubt)
+            valid is not (not doubted)
             or not -self._step <= step <= self._step
-            or (valid and self._distance(touch.u, touch.phi) > self._far)
+            or (valid and self._distance(touch.u - u_told, touch.phi - phi_told) > self._far)
             or (shape is not None and not self._extended)
         ):
             time, level, u, phi, valid, doubt, clock, sequence = touch[:8]
             self._extended = self._extended or shape is not None
-            certain = (self._u, self._phi) if self._placed and not valid else (u, phi)
+            certain = (u_told, phi_told) if self._placed and not valid else (u, phi)
             if shape is None:
                 u, phi = certain  # the last place that was certain is the better guess; a line has its own
             self._remember(level, *certain, doubt)
@@ -160,14 +160,14 @@ class ReportedTouch:
             now: host clock when it arrived [s].
             level: its level, the drift taken off.
         """
-        where = self._u, self._phi, self._placed
-        return TouchEnded(self._sensor.name, now, frame.clock_us, frame.sequence, level, *where)
+        _, u, phi, _ = self._told
+        return TouchEnded(self._sensor.name, now, frame.clock_us, frame.sequence, level, u, phi, self._placed)
 
     def _distance(self, u: float, phi: float) -> float:
-        """Return the distance of a place from the last that was reported [m], never too small."""
-        around = abs(phi - self._phi)
-        return math.hypot(u - self._u, self._radius * (around if around < math.pi else _FULL_TURN - around))
+        """Return the distance of two places that differ by this [m], never too small."""
+        around = abs(phi)
+        return math.hypot(u, self._radius * (around if around < math.pi else _FULL_TURN - around))
 
     def _remember(self, level: float, u: float, phi: float, doubt: str) -> None:
-        self._level, self._u, self._phi, self._doubt = level, u, phi, doubt
+        self._told = level, u, phi, doubt
         self._placed = self._placed or not doubt

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 from coneskin.skin.sensor import Sensor
@@ -84,9 +85,12 @@ class _WiringHypothesis:
     ) -> None:
         self.words, self.fault = words, fault
         self._broken = sensor, opened, joined
-        self._phases: tuple[_Phase, ...] = ()
         readings = {"C": (0, 3), "D": (1, 4), "A": (6,), "B": (7,), "touch": (0, 1, 2), "": ()}
         self._dead = readings[dead]
+
+    @cached_property  # by the frame that asks first: those of all hypotheses together are 2.6 ms
+    def _phases(self) -> tuple[_Phase, ...]:
+        return _phases(*self._broken)
 
     def predict(self, contact: _PointContact, upper: float, lower: float, highest: Sequence[float]) -> list[float]:
         """Return the readings over the supply, in the order of an observation.
@@ -101,8 +105,6 @@ class _WiringHypothesis:
         x = _TAP_DISTANCE if x < _TAP_DISTANCE else 1.0 - _TAP_DISTANCE if x > 1.0 - _TAP_DISTANCE else x
         y = _TAP_DISTANCE if y < _TAP_DISTANCE else 1.0 - _TAP_DISTANCE if y > 1.0 - _TAP_DISTANCE else y
         sheets = (upper / (1.0 - x), upper / x, lower / (1.0 - y), lower / y)
-        if not self._phases:  # in the frame that asks first: those of all hypotheses together are 2.6 ms
-            self._phases = _phases(*self._broken)
         found: list[float] = []
         own: list[float] = []
         for groups, reads, driven in self._phases:
@@ -294,8 +296,11 @@ class FaultDiagnosis:
 
     def __init__(self, sensor: Sensor, currents: UntouchedCurrents) -> None:
         self._sensor, self._currents = sensor, currents
-        self._hypotheses: list[_WiringHypothesis] = []
         self.end()
+
+    @cached_property
+    def _hypotheses(self) -> list[_WiringHypothesis]:
+        return _list_hypotheses(self._sensor)
 
     def end(self) -> None:
         """Forget the fault: untouched frames are valid again."""
@@ -303,9 +308,8 @@ class FaultDiagnosis:
         self.words = ""
         self._name = Fault.GUIDES_DISAGREE
         self._last: Frame | None = None
-        self._frame: Frame | None = None
+        self._given: tuple[Frame, Fault] | None = None  # what is explained
         self._fit: _Fit | None = None
-        self._number, self._given = 0, self._name
         self._found: list[tuple[float, _WiringHypothesis]] = []
 
     def rename(self, fault: Fault) -> Fault:
@@ -325,22 +329,21 @@ class FaultDiagnosis:
             the name, in the frame in which it is found.
         """
         last, self._last = self._last, frame
-        if self._frame is None or self._fit is None:
+        if self._given is None or self._fit is None:
             if last is None or self._differ(last, frame) > _REST_DIFFERENCE:
                 return None
-            if self._frame is not None and self._differ(self._frame, frame) < _CHANGE_DIFFERENCE:
+            if self._given is not None and self._differ(self._given[0], frame) < _CHANGE_DIFFERENCE:
                 return None
-            self._frame, self._given, self._number, self._found = frame, fault or self._name, 0, []
-            self._fit = self._next()
+            self._given, self._found = (frame, fault or self._name), []
+            self._fit = self._next(frame)
             return None
         for _ in range(_STEPS_PER_FRAME):
             if self._fit.improve():
                 self._found.append((self._fit.sum, self._fit.hypothesis))
-                self._number += 1
-                if self._number == len(self._hypotheses):
+                if len(self._found) == len(self._hypotheses):
                     self._fit = None
-                    return self._decide()
-                self._fit = self._next()
+                    return self._decide(self._given[1])
+                self._fit = self._next(self._given[0])
                 break
         return None
 
@@ -349,30 +352,27 @@ class FaultDiagnosis:
         most = max(abs(a - b) for a, b in zip(one[6:15], other[6:15], strict=True))
         return most / self._sensor.electronics.full_count
 
-    def _next(self) -> _Fit:
-        if not self._hypotheses:
-            self._hypotheses = _list_hypotheses(self._sensor)
-        frame, currents = self._frame, self._currents
-        assert frame is not None
+    def _next(self, frame: Frame) -> _Fit:
+        currents = self._currents
         learned = currents.radial > 0.0
         upper, lower = 1.0 / self._sensor.radial_ohms, 1.0 / self._sensor.angular_ohms
         if learned:
             upper, lower = FrameInversion(self._sensor).untouched(currents.radial, currents.angular)
         observation = _observe(self._sensor, frame, 1.5, learned)
-        return _Fit(self._hypotheses[self._number], observation, upper, lower)
+        return _Fit(self._hypotheses[len(self._found)], observation, upper, lower)
 
-    def _decide(self) -> Fault:
+    def _decide(self, given: Fault) -> Fault:
         """Return the name of the likeliest hypothesis, where those of other names are far from it."""
         total, found = min(self._found, key=lambda each: each[0])
         rest = total + _SUM_RATIO * (total if total < _CONTACT_GAIN else total - _CONTACT_GAIN)
         near = [each for other, each in self._found if other < rest + (_NAME_MARGIN if each.fault else _BROKEN_MARGIN)]
         names, fault = {hypothesis.fault for hypothesis in near}, found.fault
         self.words = ""
-        if total > _MAX_SUM or fault is None or self._given in names:
-            fault = self._given
+        if total > _MAX_SUM or fault is None or given in names:
+            fault = given
         elif names != {fault}:
             both = _PAIR_OF_WIRE.get(fault)
-            fault = both if both and names <= {both, *_WIRE_PAIRS[both]} else self._given
+            fault = both if both and names <= {both, *_WIRE_PAIRS[both]} else given
         if len(near) == 1 and found.fault is fault:
             self.words = found.words
         self._name = fault
@@ -385,16 +385,16 @@ class _Fit:
     def __init__(self, hypothesis: _WiringHypothesis, observation: _Observation, upper: float, lower: float) -> None:
         self.hypothesis = hypothesis
         self._observation, self._sheets = observation, (upper, lower)
-        self._contact, self._errors = _NO_CONTACT, [0.0]
+        self._best = _NO_CONTACT, [0.0], math.inf  # contact, errors and the sum of their squares
         self._round, self._damping = 0, 0.01
-        self.sum = self._total = math.inf
+        self.sum = math.inf
 
     def improve(self) -> bool:
         """Make the next step. Tell whether it was the last."""
         self._round += 1
         if self._round == 1:
             return self._start()
-        contact, errors, total = self._contact, self._errors, self._total
+        contact, errors, total = self._best
         columns = []
         for moved, change in self._moves(contact):
             scale = 1.0 / change
@@ -422,12 +422,12 @@ class _Fit:
         settled = False
         if better < total:
             settled = total - better < 1e-3 * total + 1e-3
-            self._contact, self._errors, self._total = moved, after, better
+            self._best = moved, after, better
             self.sum = min(self.sum, better + _CONTACT_GAIN)
             self._damping *= 0.2
         else:
             self._damping *= 8.0
-        hopeless = self._round >= _TRIAL_STEPS and self._total > _HOPELESS_SUM
+        hopeless = self._round >= _TRIAL_STEPS and self._best[2] > _HOPELESS_SUM
         return settled or hopeless or self._round >= _MAX_STEPS
 
     def _start(self) -> bool:
@@ -439,8 +439,8 @@ class _Fit:
         for contact in _START_CONTACTS:
             errors = self._compare(contact)
             total = _dot(errors, errors)
-            if total < self._total:
-                self._contact, self._errors, self._total = contact, errors, total
+            if total < self._best[2]:
+                self._best = contact, errors, total
         return False
 
     def _compare(self, contact: _PointContact) -> list[float]:

@@ -50,7 +50,6 @@ class TouchStream:
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
         self._bad = self._skipped = self._versions = 0
-        self._held_up = 0.0
         self._corrupt = self._starting = self._version_reported = False
 
     @property
@@ -77,8 +76,7 @@ class TouchStream:
         """
         events: list[SkinEvent] = []
         frames = self.decoder.feed(data)
-        if held_up != self._held_up:
-            self._held_up = held_up
+        if held_up != self.detectors[0].timing.held_up:
             for detector in self.detectors:
                 detector.timing.held_up = held_up
         for frame in frames:

@@ -41,7 +41,6 @@ class _SliderSetting:
         self.set_at = -math.inf
         self._expected: list[float] = []  # what may be read, the oldest first, until the newest is
         self._late: list[float] = []  # what may still arrive after a person's setting
-        self._resumes = False
 
     @property
     def shown(self) -> bool:
@@ -50,14 +49,13 @@ class _SliderSetting:
 
     def feed(self, now: float, slider: float) -> bool:
         """Take where the slider is at a time [s]. Return whether a person has moved it there."""
+        self.set_at = min(self.set_at, now)  # where it resumes, from now on
         if self.fraction is None:
             if now - self.set_at <= _READ_DELAY and any(abs(slider - value) <= _READ_TOLERANCE for value in self._late):
                 self.fraction, self._expected, self._late = slider, [slider], []  # it was under way to the controller
                 return False
             moved, self.ceiling = abs(slider - self.ceiling) > _READ_TOLERANCE, slider
             return moved
-        if self._resumes:
-            self._resumes, self.set_at = False, now
         shown = [number for number, value in enumerate(self._expected) if abs(slider - value) <= _READ_TOLERANCE]
         if shown:
             del self._expected[: shown[-1]]
@@ -77,7 +75,7 @@ class _SliderSetting:
     def resume(self) -> None:
         """Note that a stop may have put the slider to 0, and that it is put back now."""
         if self.fraction is not None:
-            self._expected, self._resumes = [0.0, self.fraction], True
+            self._expected, self.set_at = [0.0, self.fraction], math.inf
 
     def found(self, slider: float) -> float | None:
         """Return where to put the slider back to, from ``slider``. None where it is not where the guard has put it."""

@@ -154,7 +154,7 @@ class SpeedReduction:
             return False
         approach = self._approach_of(self._model, state.q, state.qd, reaction.deceleration, reaction.press)
         approach.update(state.q, state.qd, contacts)
-        if approach.exceeded:
+        if approach.exceeded[0]:
             return False
         if self._last is not None and time - self._last[0] < CLEAR_TIME:  # slider and speed may not yet be as before
             last = self._last[1]
@@ -175,7 +175,7 @@ class SpeedReduction:
         if (touch := self.now) is None:
             return
         touch.approach.update(state.q, state.qd, contacts)
-        touch.sample(measured_at, touch.approach.speed, touch.approach.certain)
+        touch.sample(measured_at, *touch.approach.speed)
         if contacts and not touch.held:
             touch.torque.feed(state, False)
             if touch.torque.now is not None:
@@ -186,8 +186,8 @@ class SpeedReduction:
         if (touch := self.now) is None:
             return ""
         touch.touched(time, touched)
-        if touch.approach.exceeded:
-            return f"while slow, the surface would move {1e3 * touch.approach.way:.1f} mm into the touch"
+        if touch.approach.exceeded[0]:
+            return f"while slow, the surface would move {1e3 * touch.approach.exceeded[1]:.1f} mm into the touch"
         if touch.held:
             return f"while slow, {touch.held}"
         if self.known(fair) is None:

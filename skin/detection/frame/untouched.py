@@ -78,7 +78,7 @@ class UntouchedCurrents:
 
     def restart(self) -> None:
         """Learn the currents anew. The noise stays known."""
-        self._blocks = self._count = self.frames = 0
+        self._count = self.frames = 0
         self._sum0 = self._sum1 = self._sum2 = self._zero = 0.0
 
     def skip(self) -> None:
@@ -106,7 +106,8 @@ class UntouchedCurrents:
         zero, mean1, mean2 = self._sum0 / CURRENT_BLOCK, self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
         self.skip()
         mixed = mean2 - self._weight * mean1
-        if not self._blocks:
+        blocks = self.frames // CURRENT_BLOCK
+        if not blocks:
             self.radial, self.angular, self._last, self._zero = mean1, mean2, mixed, zero
         elif abs(zero - self._zero) > max(_ZERO_CHANGE, _ZERO_DEVIATIONS * self.noise / math.sqrt(CURRENT_BLOCK)):
             crept = (zero - self._zero) / supply
@@ -122,21 +123,21 @@ class UntouchedCurrents:
             if upper != lower and abs(part1 - part2) > _ALIKE_SHARE * max(abs(part1), abs(part2)):
                 where = f"the {'upper' if upper else 'lower'} sheet, or its bond to {'A or B' if upper else 'C or D'}"
             return Fault.CURRENT_CHANGED, f"{where}: radial {100.0 * part1:+.2f} %, angular {100.0 * part2:+.2f} %"
-        self._learn_noise(mixed - self._last, supply)
+        self._learn_noise(mixed - self._last, supply, blocks)
         self._last = mixed
-        self._blocks = min(self._blocks + 1, _CURRENT_MEMORY)
-        self.frames = self._blocks * CURRENT_BLOCK
-        most = self._drift * CURRENT_BLOCK * period if self._blocks > _FREE_BLOCKS else math.inf
-        self.radial += bounded(step1 / self._blocks, most * self.radial)
-        self.angular += bounded(step2 / self._blocks, most * self.angular)
+        blocks = min(blocks + 1, _CURRENT_MEMORY)
+        self.frames = blocks * CURRENT_BLOCK
+        most = self._drift * CURRENT_BLOCK * period if blocks > _FREE_BLOCKS else math.inf
+        self.radial += bounded(step1 / blocks, most * self.radial)
+        self.angular += bounded(step2 / blocks, most * self.angular)
         if self.noise > self._noisiest:
             return Fault.NOISE, f"{self.noise:.1f} counts, at most {self._noisiest:.1f}"
         return None
 
-    def _learn_noise(self, change: float, supply: int) -> None:
+    def _learn_noise(self, change: float, supply: int, blocks: int) -> None:
         scale = (1.0 + self._weight * self._weight) / (supply * supply)  # from counts^2
-        seen = 0.5 * CURRENT_BLOCK * change * change if self._blocks else self.variance
-        self.variance += (seen - self.variance) / (_PRIOR_BLOCKS + self._blocks)
+        seen = 0.5 * CURRENT_BLOCK * change * change if blocks else self.variance
+        self.variance += (seen - self.variance) / (_PRIOR_BLOCKS + blocks)
         self.variance = max(self.variance, _ROUNDING_VARIANCE * scale)
         self.noise = math.sqrt(self.variance / scale)
         noise = max(0.0, self.variance / scale - _ROUNDING_VARIANCE)
@@ -269,9 +270,8 @@ class UntouchedGuides:
 
     def __init__(self, currents: UntouchedCurrents) -> None:
         self._currents = currents
-        self._radial = self._angular = self._level = 0.0
-        self.radial_hum = self.angular_hum = 0.0
-        self._known = False
+        self._radial = self._angular = self.radial_hum = self.angular_hum = 0.0
+        self._level = math.inf  # until it is known
 
     def hum(self, supply: float) -> tuple[float, float]:
         """Return the variances of X and Y by what swings on the guides and not on the currents; 0 where none does.
@@ -296,8 +296,8 @@ class UntouchedGuides:
         supply = frame.touch_supply
         radial = 0.5 * (frame.radial_c + frame.radial_d) / frame.radial_supply
         angular = 0.5 * (frame.angular_a + frame.angular_b) / frame.angular_supply
-        if not self._known:
-            self._radial, self._angular, self._level, self._known = radial, angular, level, True
+        if self._level == math.inf:
+            self._radial, self._angular, self._level = radial, angular, level
         step1, step2 = radial - self._radial, angular - self._angular
         split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
         differ = _GUIDE_JUMP * supply

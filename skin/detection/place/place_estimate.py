@@ -195,6 +195,11 @@ class PlaceEstimate(NamedTuple):
             ss + share * one_ss + yy * around * around,
         )
 
+    def radius(self) -> tuple[float | None, float | None]:
+        """Return the radius of the contact [m] and the deviation of its logarithm, where they can be told."""
+        radius, deviation = self.dipole.log_radius, self.dipole.log_radius_deviation
+        return (math.exp(radius), deviation) if deviation < 0.5 else (None, None)
+
 
 class PlaceEstimator:
     """The places of the contacts on one sensor.

@@ -71,7 +71,7 @@ class SingleContactTest:
         self._per_along, self._per_cross = self._angles * aspect**2, 2.0 * self._angles * aspect
         self._largest = settings.largest_contact
         self._scale = self._unit * max(1.0, _split_noise(sensor, aspect))
-        self._upper = self._lower = 0.0
+        self._sheets = 0.0, 0.0
         self.begin()
 
     def begin(self) -> None:
@@ -80,7 +80,7 @@ class SingleContactTest:
         self._differ = self._across = self._mean = self._required = self._disc = 0.0
         self._certain = False
         if self._currents.frames:
-            self._upper, self._lower = self._inversion.untouched(self._currents.radial, self._currents.angular)
+            self._sheets = self._inversion.untouched(self._currents.radial, self._currents.angular)
 
     def largest_disc(self, u: float) -> float:
         """Return the radius up to which one contact at u [m] is taken for one [m]."""
@@ -106,8 +106,8 @@ class SingleContactTest:
         if frames < _PAIR_FRAMES:
             self._frames = frames = frames + 1
         gain, limit = 1.0 / frames, self._limit
-        along, cross, around = matrix[3:6]
-        rise1, rise2 = self._per_along * (along - self._upper), self._angles * (around - self._lower)
+        (along, cross, around), (upper, lower) = matrix[3:6], self._sheets
+        rise1, rise2 = self._per_along * (along - upper), self._angles * (around - lower)
         total = level / (1.0 - level) * self._pulldown if level < 0.999 else limit
         self._differ = differ = self._differ + gain * (rise2 - rise1 - self._differ)
         self._across = across = self._across + gain * (self._per_cross * cross - self._across)

@@ -34,9 +34,6 @@ _REFRESH_FRAMES = 8  # frames for which an estimate serves at least; it costs as
 _SOLVE_STEP = 0.1  # ratio by which the conductance may change before it is
 _UNLEARNED_ERROR = 0.05  # ratio; the sheets' conductance where none was learned yet
 
-_NO_DETAILS = (None, None)  # of radius and its deviation
-_Details = tuple[float | None, float | None]
-
 
 class TouchPlace:
     """The places of the touches of one sensor.
@@ -76,7 +73,6 @@ class TouchPlace:
         self._filter = TouchFilter(self._scale)
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
-        self._softer = self._harder = 0.0
         self._located = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
@@ -137,7 +133,7 @@ class TouchPlace:
         if frames == 1:
             self._next = 1.0
         estimate = self._estimate
-        steady = self._softer < whole < self._harder
+        steady = abs(whole - self._solved) < _SOLVE_STEP * self._solved
         self._rest -= 1
         if estimate is None or (self._rest <= 0 and (frames >= self._next or not steady)):
             estimate, steady = self._solve(frame, now, period), True
@@ -161,7 +157,7 @@ class TouchPlace:
         self._located = self._located or not doubt
         return TouchReading(
             *(now, level, u, phi, not doubt, doubt, frame.clock_us, frame.sequence),
-            *(covariance if steady else None, *(self._told if steady else _NO_DETAILS)),
+            *(covariance if steady else None, *(estimate.radius() if steady else (None, None))),
             *(self._single.elongation(whole) if doubt else None, velocity),
         )
 
@@ -180,8 +176,7 @@ class TouchPlace:
         self._filter.restart()
         self._rest = 0
         self._next = 1.0
-        self._softer = self._harder = 0.0
-        self._told: _Details = _NO_DETAILS
+        self._solved = 0.0  # conductance of which the estimate was made [S]
         self._noise = None
         self._estimate: PlaceEstimate | None = None
 
@@ -193,12 +188,7 @@ class TouchPlace:
         estimate = self._estimator.estimate(mean, noise, float(frames), self._sheets(now))
         if self._map is not None:
             estimate = self._mapped(estimate)
-        dipole = estimate.dipole
-        identified = dipole.log_radius_deviation < 0.5
-        self._told = (math.exp(dipole.log_radius), dipole.log_radius_deviation) if identified else _NO_DETAILS
-        step = _SOLVE_STEP * mean.conductance
-        self._softer, self._harder = mean.conductance - step, mean.conductance + step
-        self._estimate, self._rest = estimate, _REFRESH_FRAMES
+        self._solved, self._estimate, self._rest = mean.conductance, estimate, _REFRESH_FRAMES
         self._next = frames * _REFRESH_RATIO if frames < _FLOOR_FRAMES else math.inf
         return estimate
 

@@ -79,9 +79,9 @@ def test_the_speed_of_the_surface_counts_and_not_that_of_the_joint():
     q, qd = (0.0, -0.5, 0.3, 0.0, 0.0, 0.0), (0.24, 0.0, 0.0, 0.0, 0.0, 0.0)
     approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
     approach.update(q, qd, [FOREARM])
-    assert 0.15 < approach.speed < 0.35
+    assert 0.15 < approach.speed[0] < 0.35
     approach.update(q, qd, [replace(FOREARM, location_valid=False)])
-    assert approach.speed > 0.24  # any point, where the place is not certain
+    assert approach.speed[0] > 0.24  # any point, where the place is not certain
 
 
 def test_where_the_place_is_not_certain_every_motion_counts():
@@ -90,9 +90,9 @@ def test_where_the_place_is_not_certain_every_motion_counts():
     vague = replace(FOREARM, location_valid=False)
     approach = ContactApproach(arm_model("UR10e"), q, qd, 10.0, 0.001)
     approach.update(q, qd, [vague])
-    assert not approach.exceeded
+    assert not approach.exceeded[0]
     approach.update(later, qd, [vague])
-    assert approach.exceeded == 1
+    assert approach.exceeded[0] == 1
 
 
 def test_a_place_that_comes_late_counts_from_the_beginning_of_the_touch():
@@ -103,10 +103,10 @@ def test_a_place_that_comes_late_counts_from_the_beginning_of_the_touch():
         vague = replace(FOREARM, location_valid=False)
         approach.update(q, still, [vague])
         approach.update((0.5 * way / per_radian, *q[1:]), still, [vague])
-        assert not approach.exceeded
+        assert not approach.exceeded[0]
         approach.update((way / per_radian, *q[1:]), still, [FOREARM])
-        assert approach.exceeded == exceeded
-    assert approach.way == pytest.approx(0.0006, rel=0.01)
+        assert approach.exceeded[0] == exceeded
+    assert approach.exceeded[1] == pytest.approx(0.0006, rel=0.01)
 
 
 def test_the_way_of_a_stop_is_counted():
@@ -116,7 +116,7 @@ def test_the_way_of_a_stop_is_counted():
     for room, exceeded in ((1.01, 0), (0.99, 1)):
         approach = ContactApproach(arm_model("UR10e"), q, (0.1,) + (0.0,) * 5, 10.0, room * per_radian * 0.1**2 / 20.0)
         approach.update(q, (0.1,) + (0.0,) * 5, [FOREARM])
-        assert approach.exceeded == exceeded
+        assert approach.exceeded[0] == exceeded
 
 
 def way_into(contact, q, later):
