@@ -1,4 +1,12 @@
-"""Command line of the simulated UR controller, ``coneskin sim-ur``."""
+"""Command line of the simulated UR controller, ``coneskin sim-ur``.
+
+example:
+  coneskin sim-ur --model ur10e --start-q-deg 0 -90 90 -90 -90 0
+  python -c "import rtde_receive; print(rtde_receive.RTDEReceiveInterface('127.0.0.1').getActualQ())"
+
+ur_rtde uses fixed ports, so each further arm on one machine needs an address of its own, such as --host 127.0.0.2.
+Ctrl-C stops the controller. Exit code: 0 stopped; 1 it cannot listen there, or an option is not possible.
+"""
 
 from __future__ import annotations
 
@@ -28,99 +36,65 @@ from .machine.states import DEFAULT_MODEL, PORTS, READ_ONLY, START_Q, Options, V
 from .motion.plant import RemotePlant
 from .server import Server, is_loopback
 
-EXAMPLE = """example:
-  coneskin sim-ur --model ur10e --start-q-deg 0 -90 90 -90 -90 0
-  python -c "import rtde_receive; print(rtde_receive.RTDEReceiveInterface('127.0.0.1').getActualQ())"
-
-ur_rtde uses fixed ports, so each further arm on one machine needs an address of its own, such as --host 127.0.0.2.
-Ctrl-C stops the controller. Exit code: 0 stopped; 1 it cannot listen there, or an option is not possible."""
-
-
-#: option, type of its value, default, name of the value, help
-_VALUE_OPTIONS = (
-    ("--start-delay-ms", float, 10.0, "T", "time from a program's last byte to its first cycle [ms] (%(default)g)"),
-    ("--unlock-after-s", float, 5.0, "T", "time after which a protective stop can be unlocked [s] (%(default)g)"),
-    ("--program", Path, None, "FILE", "URScript program that the dashboard command play starts"),
-    ("--programs", Path, None, "FOLDER", "programs and installations that the dashboard can load"),
-    (
-        "--external-control",
-        str,
-        "127.0.0.1:50002",
-        "HOST:PORT",
-        "where a loaded program's node External Control gets its script (%(default)s)",
-    ),
-    ("--measured", Path, None, "FILE", "behave as the controller that scripts/measure_controller.py has seen"),
-    ("--log", Path, None, "FILE", "write a JSON line for each command and event"),
-)
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``coneskin sim-ur``."""
-    parser.formatter_class = HelpFormatter
     parser.description = "Simulate a UR controller. The unmodified ur_rtde package connects to it and moves its arm."
-    parser.epilog = EXAMPLE
     add = parser.add_argument
-    for name, kind, default, metavar, text in _VALUE_OPTIONS:
-        add(name, type=kind, default=default, metavar=metavar, help=text)
+    help_text = "time from a program's last byte to its first cycle [ms] (%(default)g)"
+    add("--start-delay-ms", type=float, default=10.0, metavar="T", help=help_text)
+    help_text = "time after which a protective stop can be unlocked [s] (%(default)g)"
+    add("--unlock-after-s", type=float, default=5.0, metavar="T", help=help_text)
+    add("--program", type=Path, metavar="FILE", help="URScript program that the dashboard command play starts")
+    help_text = "programs and installations that the dashboard can load"
+    add("--programs", type=Path, metavar="FOLDER", help=help_text)
+    help_text = "where a loaded program's node External Control gets its script (%(default)s)"
+    add("--external-control", default="127.0.0.1:50002", metavar="HOST:PORT", help=help_text)
+    help_text = "behave as the controller that scripts/measure_controller.py has seen"
+    add("--measured", type=Path, metavar="FILE", help=help_text)
+    add("--log", type=Path, metavar="FILE", help="write a JSON line for each command and event")
     add("--host", default="127.0.0.1", help="address to listen on; others can reach all but 127.* (%(default)s)")
     add("--model", default=DEFAULT_MODEL, help=f"arm: {', '.join(MODEL_NAMES)} (%(default)s)")
     add("--version", default="5.25", metavar="MAJOR.MINOR", help="PolyScope version to report (%(default)s)")
-    add(
-        "--start-q-deg",
-        type=float,
-        nargs=6,
-        metavar="Q",
-        default=[round(math.degrees(q), 2) for q in START_Q],
-        help="joint positions at the start [deg] (0 -90 90 -90 -90 0)",
+    help_text = "joint positions at the start [deg] (0 -90 90 -90 -90 0)"
+    start_q = [round(math.degrees(q), 2) for q in START_Q]
+    add("--start-q-deg", type=float, nargs=6, metavar="Q", default=start_q, help=help_text)
+    help_text = "effect of a protective stop on the running program (%(default)s)"
+    add("--protective-stop", choices=("pause", "stop"), default="pause", help=help_text)
+    help_text = (
+        "control at the start; in local control no program and no command is taken. With remote control disabled in "
+        "its settings, as in URSim, it takes all and says that it is not in remote control (%(default)s)"
     )
-    add(
-        "--protective-stop",
-        choices=("pause", "stop"),
-        default="pause",
-        help="effect of a protective stop on the running program (%(default)s)",
-    )
-    add(
-        "--control",
-        choices=("local", "remote", "disabled"),
-        default="remote",
-        help="control at the start; in local control no program and no command is taken. With remote control disabled "
-        "in its settings, as in URSim, it takes all and says that it is not in remote control (%(default)s)",
-    )
+    add("--control", choices=("local", "remote", "disabled"), default="remote", help=help_text)
     services = [name for name in PORTS if not name.endswith(READ_ONLY)]
-    add(
-        "--closed",
-        nargs="+",
-        default=(),
-        choices=services,
-        metavar="SERVICE",
-        help=f"services that are switched off: {', '.join(services)}",
-    )
+    help_text = f"services that are switched off: {', '.join(services)}"
+    add("--closed", nargs="+", default=(), choices=services, metavar="SERVICE", help=help_text)
     add("--fieldbus", action="store_true", help="a fieldbus adapter holds the lower half of the input registers")
     add("--plant-descriptor", type=int, help=argparse.SUPPRESS)  # of a line to a plant, inherited: `RemotePlant`
-    add(
-        "--faults", action="store_true", help="open a port, to this computer alone, that takes faults (--json names it)"
-    )
+    help_text = "open a port, to this computer alone, that takes faults (--json names it)"
+    add("--faults", action="store_true", help=help_text)
     add("--json", action="store_true", help="print the ready line as JSON")
     add("--exit-with-parent", action="store_true", help="end with the process that started this one")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command by itself, as ``python -m coneskin.robot.sim.command``; return the exit code."""
-    parser = argparse.ArgumentParser(prog="coneskin sim-ur")
+    about = (__doc__ or "").partition("\n\n")[2]
+    parser = argparse.ArgumentParser(prog="coneskin sim-ur", epilog=about, formatter_class=HelpFormatter)
     add_arguments(parser)
-    return run(parser.parse_args(arguments))
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run the controller until SIGTERM or SIGINT; return the exit code."""
     try:
-        return _serve(args)
+        return run(parser.parse_args(arguments))
     except ConeSkinError as exc:
         print(f"coneskin sim-ur: {exc}", file=sys.stderr)
         return 1
 
 
-def _serve(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
+    """Run the controller until SIGTERM or SIGINT; return the exit code 0.
+
+    Raises:
+        ConeSkinError: it cannot listen there, or an option is not possible.
+    """
     if args.programs and not args.programs.is_dir():
         raise RobotRefused(f"--programs must be a folder, got {args.programs}")
     options = Options(

@@ -1,4 +1,27 @@
-"""Command ``coneskin sim-skin``: a virtual skin as a program of its own, on a pseudo-terminal or into a file."""
+"""Command ``coneskin sim-skin``: a virtual skin as a program of its own, on a pseudo-terminal or into a file.
+
+example:
+  coneskin sim-skin --radius1-mm 54 --height-mm 434 --touch 1.0:1.5:200:90 --touch 3:4:100:180:10
+  Print the path of a serial port. Once a program opens it, the skin sends 1000 frames a second. It is touched from
+  1.0 s to 1.5 s at u = 200 mm, phi = 90 deg with 5 N, and from 3 s to 4 s at another place with 10 N.
+
+  coneskin sim-skin --touch grip:1:2:200:90 --touch seam:3:4:200:15 --frame-length 40
+  A hand closes around the link; a palm presses on both sides of the seam, 15 deg from each edge.
+
+  coneskin sim-skin --touch 1:3:100..300:90
+  A finger slides along the link within two seconds, from u = 100 mm to u = 300 mm.
+
+  coneskin sim-skin --sensors 4 --touch 1:2:200:90@2 --script touches.txt
+  Four sensors on one port; the third is touched, and whoever a line of touches.txt names, such as grip:3:4:200:90@1.
+
+  coneskin sim-skin --specimen film --flaw slope=0.05 --flaw mains_volts=0.02 --seed 3
+  A skin as it is built: film sheets whose resistance grows by 5 % along them (a standard deviation), hum on the guides.
+
+  coneskin sim-skin --fault drop_every=50 --fault wiring=open-A --fault wiring_after=3000
+  Lose one frame in 50, and break the wire of A after 3000 frames.
+
+Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an option is not possible; 2 wrong usage.
+"""
 
 from __future__ import annotations
 
@@ -29,32 +52,6 @@ from .imperfections import Imperfections
 from .scripted_touch import TOUCH_SHAPES, ScriptedTouch
 from .skin import MODELS, VirtualSkin
 
-HELP = "run a virtual skin that sends the very bytes of a real one"
-EXAMPLE = """\
-example:
-  coneskin sim-skin --radius1-mm 54 --height-mm 434 --touch 1.0:1.5:200:90 --touch 3:4:100:180:10
-  Print the path of a serial port. Once a program opens it, the skin sends 1000 frames a second. It is touched from
-  1.0 s to 1.5 s at u = 200 mm, phi = 90 deg with 5 N, and from 3 s to 4 s at another place with 10 N.
-
-  coneskin sim-skin --touch grip:1:2:200:90 --touch seam:3:4:200:15 --frame-length 40
-  A hand closes around the link; a palm presses on both sides of the seam, 15 deg from each edge.
-
-  coneskin sim-skin --touch 1:3:100..300:90
-  A finger slides along the link within two seconds, from u = 100 mm to u = 300 mm.
-
-  coneskin sim-skin --sensors 4 --touch 1:2:200:90@2 --script touches.txt
-  Four sensors on one port; the third is touched, and whoever a line of touches.txt names, such as grip:3:4:200:90@1.
-
-  coneskin sim-skin --specimen film --flaw slope=0.05 --flaw mains_volts=0.02 --seed 3
-  A skin as it is built: film sheets whose resistance grows by 5 % along them (a standard deviation), hum on the guides.
-
-  coneskin sim-skin --fault drop_every=50 --fault wiring=open-A --fault wiring_after=3000
-  Lose one frame in 50, and break the wire of A after 3000 frames.
-
-Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an option is not possible; 2 wrong usage.
-"""
-
-
 _MAX_SCRIPT = 1 << 20  # bytes of a script
 _FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
 # of the electronics, and of time
@@ -64,7 +61,6 @@ _FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(_ELECTRIC_FLA
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
-    parser.epilog = EXAMPLE
     add = parser.add_argument
     many: dict[str, Any] = {"action": "append", "default": []}
     add("--radius1-mm", type=float, default=54.0, help="radius of the link at end 1 (default 54)")
