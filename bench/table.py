@@ -91,6 +91,7 @@ BENCHES = {
     "design-map": Bench("bench.design.map", "Links of other shapes."),
     "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
     "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
+    "design-copies": Bench("bench.design.copies", "Links of which a part is missing."),
     "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),
     "design-assembly": Bench(
         "bench.design.assembly", "Whether a person would build each sheet; poses in which an arm folds."

@@ -124,6 +124,22 @@ class Mesh:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
         return frozen(_outermost_points(self.vertices), (None, 3), "outermost")
 
+    @cached_property
+    def own_frame(self) -> tuple[Floats, Floats]:
+        """A frame that belongs to the surface, whatever its faces and its pose are.
+
+        Its origin is the centroid of the surface [m], shape (3,); its axes are the principal ones, as columns, shape
+        (3, 3), each towards the side to which the surface reaches further (third moments). It may be left-handed, so
+        that a mirrored surface has the mirrored frame.
+        """
+        corners, areas = self.triangles, self.normals_and_areas[1]
+        # three middles of edges give a face's first and second moments exactly
+        nodes, weights = (0.5 * (corners + np.roll(corners, 1, axis=1))).reshape(-1, 3), np.repeat(areas, 3)
+        middle = weights @ nodes / weights.sum()
+        off = nodes - middle
+        ways = np.linalg.eigh((off * weights[:, None]).T @ off)[1]
+        return np.asarray(middle), ways * np.where(weights @ (off @ ways) ** 3 < 0.0, -1.0, 1.0)
+
     @property
     def size(self) -> Floats:
         """Extents along the axes of the frame [m], shape (3,)."""

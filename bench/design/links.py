@@ -107,7 +107,7 @@ def starts_apart(singles: list[Choice]) -> list[Choice]:
 def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     """Area of the best packing over the area of the hull, and the number of axes tried."""
     rays = RayCaster(mesh)
-    hull = sample_surface(mesh, rays, 12_000, seed=7)
+    hull = sample_surface(mesh, rays, 12_000)
     whole = len(hull) * hull.area
     wanted = SheetRequirements(FIT_TOLERANCE, sheets, least_gain=LEAST_GAIN * whole)
     axes = brute_axes(hull)
@@ -122,7 +122,9 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     best = 0.0
     for packing in packings[:FINE_PACKINGS]:
         made = stage.completed(stage.made(packing))
-        fitted = [fitted_sheet(about, side, 0, hull, FIT_TOLERANCE) for about in made for side in about.sides]
+        fitted = [
+            fitted_sheet(about, side, 0, hull, FIT_TOLERANCE, wanted.seam) for about in made for side in about.sides
+        ]
         best = max(best, sum(sheet.frustum.area for sheet in fitted))
     return best / whole, len(axes)
 

@@ -398,6 +398,7 @@ def fitted_sheet(
     axis: int,
     hull: SurfaceSamples,
     tolerance: float,
+    seam: Floats,
     worth: Floats | None = None,
 ) -> FittedSheet:
     """Return one side of a plan as a sheet on the link.
@@ -408,6 +409,7 @@ def fitted_sheet(
         axis: number of the axis.
         hull: samples of the link.
         tolerance: largest distance between sheet and hull [m].
+        seam: direction in which the seam of a full wrap faces, shape (3,).
         worth: what each sample counts, shape (n,); the same for all by default.
     """
     profile, frame = plan.profile, plan.profile.frame
@@ -416,7 +418,7 @@ def fitted_sheet(
     width = math.tau / len(profile.phi)
     full = side.columns == len(profile.phi)
     wrap = math.tau if full else (side.columns - 1) * width
-    turn = 0.0 if full else side.column * width
+    turn = frame.azimuth(seam) if full else side.column * width
     spin = np.array([[math.cos(turn), -math.sin(turn), 0.0], [math.sin(turn), math.cos(turn), 0.0], [0, 0, 1]])
     base = frame.origin + start * frame.axis
     rows = [(float(a), float(b), float(c)) for a, b, c in frame.columns @ spin]

@@ -100,7 +100,7 @@ def _cone_hypotheses(
     )
     if len(origins) == 0:
         return []
-    voters = rng.permutation(len(samples))[:_VOTER_COUNT]
+    voters = samples.some(_VOTER_COUNT)
     explained = _explains(samples.points[voters], samples.normals[voters], origins, axes, radii, angles, distance)
     best = itertools.islice(most_voted(explained.astype(np.float32), _LEAST_SHARE), max_count)
     return [InfiniteCone(origins[k], axes[k], float(radii[k]), float(angles[k])) for k in best]

@@ -235,6 +235,7 @@ def _refined(
 
 HULL_SHARE = 0.15  #: share of the area; a convex mesh of which less can be covered is taken for a collision hull
 LEAST_GAIN = 0.04  #: share of the hull that a further sheet must add; a fillet adds less
+_FIRST_RAY = (0.74, 0.57, 0.36)  # in the link's own frame; oblique, so that it lies along no axis
 _HINT_STEP = 1e-5  # m; a tolerance is advised in hundredths of a millimetre
 
 
@@ -304,6 +305,8 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     """Find the frusta that cover most of a sampled link; ``say`` is called with the name of each step."""
     asked = {item.name: getattr(options, item.name) for item in fields(FitOptions)}
     asked |= {"max_sheets": options.most_sheets, "weights": link.weights}
+    # the rays about an axis begin at a direction of the link's own, so that the sheets do not depend on its frame
+    asked["seam_direction"] = tuple(link.mesh.own_frame[1] @ _FIRST_RAY)
     requirements = SheetRequirements(**asked, least_gain=LEAST_GAIN * link.weighed_area)
     say("measuring profiles")
     surveys = survey_axes(link, requirements)
@@ -335,7 +338,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         if looser:
             first = looser[0]
             widest = max(first.sides, key=lambda side: side.area(first.profile))
-            nearest = fitted_sheet(first, widest, 0, link.counted, needed, worth)
+            nearest = fitted_sheet(first, widest, 0, link.counted, needed, options.seam, worth)
         return replace(fit, nearest=nearest, needed_tolerance=needed, reason=reason)
     first = axes[0]
     full = sum(len(about.sides) for about in axes) >= requirements.max_sheets
@@ -343,7 +346,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
     return replace(
         fit,
         sheets=tuple(
-            fitted_sheet(about, side, number, link.counted, tolerance, worth)
+            fitted_sheet(about, side, number, link.counted, tolerance, options.seam, worth)
             for number, about in enumerate(axes)
             for side in about.sides
         ),

@@ -44,6 +44,11 @@ class AxisFrame:
         """Unit vector along the axis."""
         return np.asarray(self.columns[:, 2])
 
+    def azimuth(self, way: Floats) -> float:
+        """Return the azimuth of a direction [rad]; 0 for one along the axis."""
+        x, y = (float(value) for value in way @ self.columns[:, :2])
+        return math.atan2(y, x) if math.hypot(x, y) > 1e-3 else 0.0
+
     def local(self, points: Floats) -> Floats:
         """Return points in the coordinates of this frame [m], shape (n, 3)."""
         return np.asarray((points - self.origin) @ self.columns)

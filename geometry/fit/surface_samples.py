@@ -37,6 +37,10 @@ class SurfaceSamples:
     def __len__(self) -> int:
         return len(self.points)
 
+    def some(self, count: int) -> Ints:
+        """Return the indices of so many points, or of all if there are fewer, evenly over the hull."""
+        return np.arange(min(count, len(self))) * len(self) // min(count, len(self))
+
     def subset(self, chosen: Bools) -> SurfaceSamples:
         """Return the chosen points; ``chosen`` has the shape (n,)."""
         return SurfaceSamples(self.points[chosen], self.normals[chosen], self.faces[chosen], self.area)
@@ -60,31 +64,55 @@ class SurfaceSamples:
         return np.asarray(np.quantile(cosines, 0.5, axis=1) >= _FLAT_COSINE)
 
 
-def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000, seed: int = 1) -> SurfaceSamples:
+_MOST_LINES = 400_000  # a body that so few of them cross is a wire
+_MOST_CROSSINGS = 40  # of a line; behind so many walls nothing is visible from outside
+_LINE_STEPS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # Roberts' sequence R4
+_CELL_BITS = 10  # of each coordinate by which samples are put in order
+
+
+def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000) -> SurfaceSamples:
     """Spread points over a mesh by area and keep those from which a ray along the normal leaves the link.
 
-    This removes inner walls and screws in their holes, and corrects flipped faces: a point is kept if a ray leaves the
-    link from one of the two sides of its face, and that side gives its normal.
+    The points are where a fixed sequence of lines, even in way and place about the body's own frame, crosses the mesh;
+    lines cross each area equally often (Cauchy and Crofton). So the points belong to the surface, whatever its faces,
+    their order and its pose are. They come cell by cell, so that a point more or less changes little in their order.
+
+    The selection removes inner walls and screws in their holes, and corrects flipped faces: a point is kept if a ray
+    leaves the link from one of the two sides of its face, and that side gives its normal.
 
     Args:
         mesh: the link.
         rays: a ray caster of the same mesh.
-        count: number of points before the selection.
-        seed: seed of the random numbers.
+        count: about how many points there are before the selection.
 
     Raises:
         MeshError: no point is visible from outside.
     """
-    rng = np.random.default_rng(seed)
+    middle, ways = mesh.own_frame
     face_normals, areas = mesh.normals_and_areas
-    total = np.cumsum(areas)
-    face = np.searchsorted(total, (np.arange(count) + rng.random(count)) / count * total[-1], side="right")
-    face = np.minimum(face, len(areas) - 1)
-    a, b, c = mesh.triangles[face].transpose(1, 0, 2)
-    root, share = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
-    points = (1.0 - root) * a + root * (1.0 - share) * b + root * share * c
+    reach = 1.001 * float(np.linalg.norm(mesh.outermost - middle, axis=1).max())
+    lift = 1e-5 * float(mesh.size.max())  # m; a ray must not hit its own face in float32
+    # of the lines through a ball of the radius R, each crosses an area in it A / (2 pi R2) times on average
+    lines = math.ceil(min(count * math.tau * reach**2 / float(areas.sum()), _MOST_LINES))
+    start, way = _lines_through_ball(lines)
+    start, way = middle + reach * start @ ways.T, way @ ways.T
+    crossings = []
+    for _ in range(_MOST_CROSSINGS):
+        depth, face = rays.cast(start, way)
+        hit = np.isfinite(depth)
+        if not hit.any():
+            break
+        way, face = way[hit], face[hit]
+        start = start[hit] + depth[hit][:, None] * way
+        crossings.append((start, face))
+        start = start + lift * way
+    if not crossings:
+        raise MeshError(f"{mesh.source}: no face is visible from outside")
+    points, face = (np.concatenate(part) for part in zip(*crossings, strict=True))
+    cells = ((points - middle) @ ways / reach * 2 ** (_CELL_BITS - 1)).astype(np.int64) + 2 ** (_CELL_BITS - 1)
+    order = np.argsort(sum(((cells[:, i] >> k) & 1) << (3 * k + i) for k in range(_CELL_BITS) for i in range(3)))
+    points, face = points[order], face[order]
     normals = face_normals[face]
-    lift = 1e-5 * float(mesh.size.max())  # m; the ray must not hit its own face in float32
     outer = np.isinf(rays.cast(points + lift * normals, normals)[0])
     inner = np.isinf(rays.cast(points - lift * normals, -normals)[0])
     # both sides of an open surface are outer ones: the normal points away from the middle
@@ -94,4 +122,15 @@ def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000, seed: int = 1
     if not keep.any():
         raise MeshError(f"{mesh.source}: no face is visible from outside")
     normals = np.where(flip[:, None], -normals, normals)
-    return SurfaceSamples(points[keep], normals[keep], face[keep], float(total[-1]) / count)
+    return SurfaceSamples(points[keep], normals[keep], face[keep], float(areas.sum()) / len(points))
+
+
+def _lines_through_ball(count: int) -> tuple[Floats, Floats]:
+    """Return starts and unit ways of lines, even in way and place, through the ball of radius 1, shapes (count, 3)."""
+    height, turn, out, around = (np.outer(_LINE_STEPS, np.arange(1, count + 1)) + 0.5) % 1.0
+    height, turn, around = 2.0 * height - 1.0, math.tau * turn, math.tau * around
+    flat, none = np.sqrt(1.0 - height**2), np.zeros(count)
+    way = np.stack([flat * np.cos(turn), flat * np.sin(turn), height], axis=1)
+    first = np.stack([-np.sin(turn), np.cos(turn), none], axis=1)
+    place = np.sqrt(out) * np.stack([np.cos(around), np.sin(around)])
+    return place[0][:, None] * first + place[1][:, None] * np.cross(way, first) - way, way

@@ -162,7 +162,7 @@ def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -
     if len(samples) < 24:
         return []
     size = float(np.ptp(samples.points, axis=0).max())
-    voters = rng.permutation(len(samples))[:_VOTER_COUNT]
+    voters = samples.some(_VOTER_COUNT)
     found: list[RulingCandidate] = []
     for direction in _directions(samples, voters, rng, axes):
         obeys = np.abs(samples.normals @ direction) < 2.0 * _RULING_GATE
