@@ -23,8 +23,8 @@ from typing import Final
 
 from coneskin.core.errors import SensorError
 
-_LINE_SHARE: Final = 0.23  # of an electrode's own resistance: its mean drop is 1/3, and both electrodes' oppose
-_PATCH_SHARE: Final = 0.11  # of the variance of patches a third of a side wide: what a line through them sees
+LINE_SHARE: Final = 0.23  #: of an electrode's own resistance: its mean drop is 1/3, and both electrodes' oppose
+PATCH_SHARE: Final = 0.11  #: of the variance of patches a third of a side wide: what a line through them sees
 _CONTACT_SHARE: Final = 0.25  # of the correction for a contact's size; none is a uniform disc
 _PHASE_COUNT: Final = 2  # readings that make a fraction
 
@@ -85,9 +85,9 @@ class PlaceFloor:
 
     def __init__(self, tolerance: SheetTolerance, size: tuple[float, float], ohms: tuple[float, float]) -> None:
         self._length, self._breadth = size
-        leads = math.sqrt(tolerance.lead**2 + (_LINE_SHARE * tolerance.line) ** 2)
+        leads = math.sqrt(tolerance.lead**2 + (LINE_SHARE * tolerance.line) ** 2)
         self._leads = (leads / ohms[0]) ** 2, (leads / ohms[1]) ** 2
-        self._slope, self._patches = 0.25 * tolerance.slope**2, _PATCH_SHARE * tolerance.patches**2
+        self._slope, self._patches = 0.25 * tolerance.slope**2, PATCH_SHARE * tolerance.patches**2
         self._skew = tolerance.skew
         self._reading = _PHASE_COUNT * tolerance.reading**2
         self._contact, self._share = tolerance.contact**2, _CONTACT_SHARE if tolerance != IDEAL_SHEETS else 0.0

@@ -36,7 +36,7 @@ def test_unknown_leads_are_found_and_taken_off(tmp_path: Path, capsys: Output) -
     assert [line["kind"] for line in lines if line["kind"] != "reading"] == ["mark", "read"] * 4 + ["end"]
     end = lines[-1]
     assert end["before_rms_mm"] > 1.0
-    assert end["after_rms_mm"] < 0.3
+    assert end["after_rms_mm"] < 0.6  # by the other three
     assert end["extra_ohm"] == pytest.approx([3.0, 11.0, 8.0, 5.0], abs=1.5)  # 1 ohm is 0.2 mm
     assert end["file"] == str(tmp_path / "own" / "device-7.json")
     (record,) = _read_calibrations(tmp_path / "own" / "device-7.json", 7)

@@ -14,6 +14,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.calibration import PlaceMap
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import FILM_SHEETS
 
 FOREARM = Frustum(0.0376, 0.0372, 0.26, math.radians(350.0))
 PAPER = Frustum(0.025, 0.05, 0.0968, 6.0)  # its radii double, as those of the paper's sector
@@ -50,8 +51,9 @@ def distance(cone: Frustum, place: tuple[float, float], other: tuple[float, floa
 def test_offset_gain_and_shear_are_recovered(sensor: Sensor, count: int) -> None:
     true = PlaceMap(sensor.frustum, AFFINE.along, AFFINE.around)
     fit = fit_map(sensor, touched(sensor, through(true), count), PRECISE)
-    assert fit.place_map.along == pytest.approx(true.along, abs=2e-5)
-    assert fit.place_map.around == pytest.approx(true.around, abs=2e-5)
+    room = 2e-5 if count > 4 else 1e-3  # four marks do not exclude a film's bends, of which they are near the rims
+    assert fit.place_map.along == pytest.approx(true.along, abs=room)
+    assert fit.place_map.around == pytest.approx(true.around, abs=room)
     assert fit.before.rms > 1e-3
     assert all(fit.used)
 
@@ -92,6 +94,28 @@ def test_the_error_of_the_map_is_what_is_stated_for_places_that_nobody_touched()
         squares += judged(sensor, fit, through(true), rng) ** 2
         said += 2.0 * fit.map_error**2  # along and around
     assert 0.8 < math.sqrt(said / squares) < 1.4  # that nothing else is wrong with the sheet, 16 touches do not show
+
+
+def test_a_film_is_read_within_half_a_millimetre_and_that_is_what_is_stated() -> None:
+    sensor, rng = SENSORS[0], random.Random(4)
+    tall, wide = sensor.frustum.slant, sensor.frustum.wrap
+    squares, said = [], 0.0
+    for seed in range(20):
+        bends = [(rng.gauss(0.0, 0.5 * FILM_SHEETS.slope), *rng.choices((-1, 0, 1), k=2)) for _ in "uv"]
+
+        def bent(x: float, y: float, bend: float, across: int, waves: int) -> float:  # 0 at both electrodes
+            patch = 0.002 * waves * math.sin(math.tau * x) * math.cos(math.pi * y)
+            return x + bend * x * (1.0 - x) + patch + 0.002 * across * math.sin(math.pi * x) * (2.0 * y - 1.0)
+
+        def reads(place: Place, bends: list[tuple[float, int, int]] = bends) -> Place:
+            x, y = place.u / tall, place.phi / wide
+            return Place(tall * bent(x, y, *bends[0]), wide * bent(y, x, *bends[1]))
+
+        fit = fit_map(sensor, touched(sensor, reads, 9, 0.3e-3, seed))
+        squares.append(judged(sensor, fit, reads, rng) ** 2)
+        said += 2.0 * fit.map_error**2
+    assert math.sqrt(sum(squares) / 20) < 0.5e-3
+    assert 0.8 < math.sqrt(said / sum(squares)) < 1.25
 
 
 def test_the_next_mark_is_where_the_map_is_known_least() -> None:

@@ -1,10 +1,11 @@
 """Fit of a place map to touches of known places: robust, and no richer than the touches support.
 
-For each of the two fractions: offset and gain (unknown leads and joints, electrodes off their drawing), shear (a sheet
-that is mounted askew), and three terms that bend (sheets that are not uniform). Each group has a normal prior about 0.
-How wide it is, and how much beside the marks' own error is left unexplained, is not known: all of a grid of widths are
-fitted, and each weighs as much as it makes the touches likely (Bayesian model averaging). What is not there is left
-alone. The same gives the covariance of the map, and from that its error at places that nobody has touched.
+For each of the two fractions: offset and gain (unknown leads and joints, electrodes off their drawing) and shear (a
+sheet that is mounted askew), each with a normal prior about 0, and what sheets of a class read wrongly from place to
+place, a Gaussian process whose variances are those of ``skin.tolerance``. How wide the priors are, which class it is,
+and how much beside the marks' own error is left unexplained, is not known: all of a grid are fitted, and each weighs as
+much as it makes the touches likely (Bayesian model averaging). What is not there is left alone. The map is what comes
+nearest to their mean all over the sheet, and its error at places that nobody has touched is what is left there.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ import numpy as np
 from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
 from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
+from coneskin.skin.tolerance import LINE_SHARE, PATCH_SHARE, SHEET_CLASSES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from coneskin.core.arrays import Floats
     from coneskin.skin.sensor import Sensor
+    from coneskin.skin.tolerance import SheetTolerance
 
 MIN_TOUCHES = 4  #: at different places
 _MIN_EXTENT = 0.3  # of the sheet, between the outermost of them
@@ -103,7 +106,13 @@ def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]
 
 _AFFINE_TERMS = 3
 _AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset and gain, and of shear
-_BEND_WIDTHS = (0.0, 0.005, 0.02, 0.06)  # of the terms that bend
+_CAUSES = (
+    *((name, 0.0) for name in SHEET_CLASSES),
+    *(("ideal", width) for width in (0.005, 0.02, 0.06)),
+)  # of bends: a class of sheets, or any with a standard deviation of the terms that bend
+_PATCH_WAVES = math.pi * np.arange(1.0, 5.0)[:, None, None]  # of what patches do, along their field
+_PATCH_BREADTH = 0.3  # of the other side; distance over which it is alike
+_SKEW_WAVES = math.pi * np.array([1.0, 3.0])[:, None, None]
 _REST_RATIOS = (1.0, 1.3, 2.0, 4.0, 8.0)  # standard deviation of a touch over the marks' own error
 _SIMPLER_ODDS = 3.0  # that a group of terms, or anything beside them, is not there, before any touch
 _ENOUGH_SHARE = 0.9  # of the map's error; another mark that leaves more of it is not worth its touch
@@ -112,7 +121,7 @@ _MAX_WRONG = 0.25  # part of the touches that may be left out
 _MAX_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
 _MEDIAN_TO_SIGMA = 1.4826  # of a normal distribution
 _MIN_SPACING = 0.3  # of a fraction, between two touches that a first line is laid through
-_GRID_POINTS = 11  # places along and around at which the error of the map is looked at
+_GRID_PARTS = ((np.arange(11) + 0.5) / 11).tolist()  # of the sides, at which the error of the map is looked at
 
 
 class Errors(NamedTuple):
@@ -162,19 +171,25 @@ class CalibrationFit:
 
 
 class _Axis(NamedTuple):
-    """One fraction of all touches: what is missing to the mark, in parts; the terms; metres for one part."""
+    """One fraction of all touches: what is missing to the mark, in parts; terms; metres for one part; places."""
 
     missing: Floats
     terms: Floats
     metres: Floats
+    places: Floats  # this fraction and the other, a row each
 
     @property
     def missed(self) -> Floats:
         """What is missing to the mark [m]."""
         return self.missing * self.metres
 
+    @property
+    def design(self) -> Floats:
+        """The terms [m]."""
+        return self.terms * self.metres[:, None]
+
     def pick(self, chosen: NDArray[np.bool_]) -> _Axis:
-        return _Axis(self.missing[chosen], self.terms[chosen], self.metres[chosen])
+        return _Axis(*(values[chosen] for values in self))
 
     def rest(self, numbers: Floats) -> Floats:
         """Return what these numbers leave [m]."""
@@ -205,12 +220,15 @@ def fit_map(
     inside = [axis.pick(used) for axis in axes]
     along, around = (_solve(axis, _AFFINE_TERMS).tolist()[:2] for axis in inside)
     _check_offsets_and_gains(sensor, along, around, sheet_ohms)
-    posteriors = [_average(axis, mark_error) for axis in inside]
+    grid = [Place(a * sensor.frustum.slant, b * sensor.frustum.wrap) for a in _GRID_PARTS for b in _GRID_PARTS]
+    sheets = _axes(sensor, [KnownTouch(place, place) for place in grid])
+    ohms = (sensor.radial_ohms, sensor.upper_sheet_ohms), (sensor.angular_ohms, sensor.lower_sheet_ohms)
+    posteriors = [_average(*one, mark_error) for one in zip(inside, sheets, ohms, strict=True)]
     numbers = [posterior.numbers.tolist() for posterior in posteriors]
     _check_bends(sensor, *numbers)
     place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
     left = [posterior.left for posterior in posteriors]
-    map_error, next_mark, then = _untouched_error(sensor, posteriors, mark_error)
+    map_error, next_mark, then = _untouched_error(grid, posteriors, mark_error)
     every = [axis.rest(posterior.numbers) for axis, posterior in zip(axes, posteriors, strict=True)]
     for whole, part in zip(every, left, strict=True):
         whole[used] = part
@@ -243,14 +261,13 @@ def _axes(sensor: Sensor, touches: Sequence[KnownTouch]) -> tuple[_Axis, _Axis]:
             turn = 2.0 * math.pi / cone.wrap
             turned -= turn * round(turned / turn)
         for_x, for_y = map_terms(seen_x, seen_y)
-        along.append((x - seen_x, for_x, cone.slant / _slope(sensor, mark.u)))
-        around.append((turned, for_y, cone.wrap * cone.radius_at(mark.u)))
+        along.append((x - seen_x, for_x, cone.slant / _slope(sensor, mark.u), (seen_x, seen_y)))
+        around.append((turned, for_y, cone.wrap * cone.radius_at(mark.u), (seen_y, seen_x)))
     return _axis(along), _axis(around)
 
 
-def _axis(rows: Sequence[tuple[float, tuple[float, ...], float]]) -> _Axis:
-    missing, terms, metres = zip(*rows, strict=True)
-    return _Axis(np.array(missing), np.array(terms), np.array(metres))
+def _axis(rows: Sequence[tuple[float, tuple[float, ...], float, tuple[float, float]]]) -> _Axis:
+    return _Axis(*map(np.array, zip(*rows, strict=True)))
 
 
 def _fractions(sensor: Sensor, place: Place) -> tuple[float, float]:
@@ -267,67 +284,92 @@ def _slope(sensor: Sensor, u: float) -> float:
 def _solve(axis: _Axis, count: int) -> Floats:
     """Return the numbers that fit best in metres; those that are not fitted are zero."""
     numbers = np.zeros(len(MAP_LIMITS))
-    numbers[:count] = np.linalg.lstsq(axis.terms[:, :count] * axis.metres[:, None], axis.missed, rcond=None)[0]
+    numbers[:count] = np.linalg.lstsq(axis.design[:, :count], axis.missed, rcond=None)[0]
     return numbers
 
 
 class _Posterior(NamedTuple):
-    """What the touches leave of the numbers of one fraction."""
+    """What the touches leave of one fraction."""
 
     numbers: Floats
-    covariance: Floats
-    rest: float  #: variance of the sheet beside its map [m^2]
+    covariance: Floats  #: of what is missing all over the sheet [m^2]
+    unmapped: Floats  #: its mean beside the map [m]
+    rest: float  #: variance of a touch beside the marks' own [m^2]
     left: Floats  #: what a map without each touch misses its mark by [m]
     words: str
 
 
-def _average(axis: _Axis, mark_error: float) -> _Posterior:
-    """Fit all widths of the priors, and average by how likely each makes the touches."""
-    design, missing = axis.terms * axis.metres[:, None], axis.missed
-    count = len(missing)
-    fits = []
-    for affine, shear, bend, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _BEND_WIDTHS, _REST_RATIOS):
-        prior = np.array([affine, affine, shear, bend, bend, bend]) ** 2
-        noise = (ratio * mark_error) ** 2
-        spread = design * prior
-        inverse = np.linalg.inv(spread @ design.T + noise * np.eye(count))
-        gain = spread.T @ inverse
-        likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
-        likely += (affine, shear, bend, ratio - 1.0).count(0.0) * math.log(_SIMPLER_ODDS)
-        fits.append((likely, gain, np.diag(prior) - gain @ spread, noise - mark_error**2, bend > 0.0))
-    most = max(fit[0] for fit in fits)
-    weights = np.array([math.exp(fit[0] - most) for fit in fits])
-    weights /= weights.sum()
-    each = [fit[1] @ missing for fit in fits]
-    gain = sum(weight * fit[1] for weight, fit in zip(weights, fits, strict=True))
-    numbers = gain @ missing
-    covariance = sum(
-        weight * (fit[2] + np.outer(one - numbers, one - numbers))
-        for weight, fit, one in zip(weights, fits, each, strict=True)
+def _flaws(sheets: SheetTolerance, ohms: tuple[float, float], axis: _Axis) -> Floats:
+    """Return the covariances of what sheets of a class read wrongly at places [m^2]; ohms as of ``_average``."""
+    x, y = axis.places.T[:, :, None]
+    leads = (sheets.lead**2 + (LINE_SHARE * sheets.line) ** 2) / ohms[0] ** 2
+    sines = np.sin(_PATCH_WAVES * x) / _PATCH_WAVES
+    patches = 2.0 * PATCH_SHARE * sheets.patches**2 * np.exp(-0.5 * ((y - y.T) / _PATCH_BREADTH) ** 2)
+    half = 0.5 * _SKEW_WAVES * ohms[1] / ohms[0]
+    turned = np.sin(_SKEW_WAVES * x) * np.sinh(half * (2.0 * y - 1.0)) / np.cosh(half) / _SKEW_WAVES**2
+    skew, slope = 4.0 * sheets.skew * turned.sum(axis=0), 0.5 * sheets.slope * x * (1.0 - x)
+    lines = leads * ((1.0 - x) * (1.0 - x.T) + x * x.T) + slope * slope.T + skew * skew.T
+    return np.asarray(
+        (lines + patches * (sines * sines.swapaxes(1, 2)).sum(axis=0)) * axis.metres * axis.metres[:, None]
     )
-    smoothed = design @ gain
-    left = (missing - smoothed @ missing) / np.maximum(1.0 - np.diag(smoothed), 1e-9)
-    rest = sum(weight * fit[3] for weight, fit in zip(weights, fits, strict=True))
-    bends = sum(weight for weight, fit in zip(weights, fits, strict=True) if fit[4])
-    words = "offset, gain, shear and bend" if bends > 0.5 else "offset, gain and shear"
-    return _Posterior(numbers, np.asarray(covariance), float(rest), left, words)
 
 
-def _untouched_error(sensor: Sensor, posteriors: Sequence[_Posterior], mark_error: float) -> tuple[float, Place, float]:
+def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: float) -> _Posterior:
+    """Fit all causes of bends and widths of the priors, and average by how likely each makes the touches.
+
+    Args:
+        axis: of the touches.
+        sheet: of places all over it.
+        ohms: of the sheet from electrode to electrode, and per square.
+        mark_error: see ``fit_map`` [m].
+    """
+    missing, count, fits = axis.missed, len(axis.missing), []
+    every = _Axis(*map(np.concatenate, zip(axis, sheet, strict=True)))
+    for cause in _CAUSES:
+        name, bend = cause
+        flaws = _flaws(SHEET_CLASSES[name], ohms, every)
+        for affine, shear, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _REST_RATIOS):
+            spread = every.design * (affine, affine, shear, bend, bend, bend)
+            prior = flaws + spread @ spread.T
+            noise = (ratio * mark_error) ** 2
+            inverse = np.linalg.inv(prior[:count, :count] + noise * np.eye(count))
+            likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
+            absent = (affine, shear, ratio - 1.0, _CAUSES.index(cause)).count(0)
+            gain = prior[count:, :count] @ inverse
+            alone = inverse @ missing / np.diag(inverse)  # what is missing to what the other touches say
+            covariance = prior[count:, count:] - gain @ prior[:count, count:]
+            rest = noise - mark_error**2
+            fits.append((likely + absent * math.log(_SIMPLER_ODDS), gain, covariance, alone, rest, cause != _CAUSES[0]))
+    odds, gains, covariances, alones, rests, bent = (np.array(each) for each in zip(*fits, strict=True))
+    weights = np.exp(odds - odds.max())
+    weights /= weights.sum()
+    gain = np.tensordot(weights, gains, 1)
+    mean = gain @ missing
+    off = gains @ missing - mean
+    fitted = np.linalg.pinv(sheet.design)
+    smoothed = axis.design @ fitted @ gain
+    words = "offset, gain, shear and bend" if weights @ bent > 0.5 else "offset, gain and shear"
+    return _Posterior(
+        fitted @ mean,
+        np.tensordot(weights, covariances, 1) + (off.T * weights) @ off,
+        mean - sheet.design @ fitted @ mean,
+        float(weights @ rests),
+        missing - smoothed @ missing + np.diag(smoothed) * (weights @ alones),
+        words,
+    )
+
+
+def _untouched_error(
+    places: Sequence[Place], posteriors: Sequence[_Posterior], mark_error: float
+) -> tuple[float, Place, float]:
     """Return the error of the map over the sheet [m], the place that a touch would tell most of, and the error then."""
-    cone = sensor.frustum
-    parts = (np.arange(_GRID_POINTS) + 0.5) / _GRID_POINTS
-    places = [Place(float(a * cone.slant), float(b * cone.wrap)) for a in parts for b in parts]
-    terms = np.array([map_terms(*_fractions(sensor, place)) for place in places])
-    metres = np.array([(cone.slant / _slope(sensor, p.u), cone.wrap * cone.radius_at(p.u)) for p in places])
     now, then = np.zeros(len(places)), np.zeros(len(places))
-    for k, posterior in enumerate(posteriors):
-        design = terms[:, k] * metres[:, k, None]
-        between = design @ posterior.covariance @ design.T
-        own = np.diag(between)
-        noise = mark_error**2 + posterior.rest
-        now += own + posterior.rest
-        then += np.mean(own) + posterior.rest - np.mean(between**2, axis=0) / (own + noise)
+    for posterior in posteriors:
+        own = np.diag(posterior.covariance)
+        beside = float(np.mean(posterior.unmapped**2)) + posterior.rest
+        now += own + beside
+        then += np.mean(own) + beside
+        then -= np.mean(posterior.covariance**2, axis=0) / (own + mark_error**2 + posterior.rest)
     best = int(np.argmin(then))
     return math.sqrt(0.5 * max(0.0, float(np.mean(now)))), places[best], math.sqrt(0.5 * max(0.0, float(then[best])))
 

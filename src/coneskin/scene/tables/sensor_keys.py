@@ -141,8 +141,8 @@ CALIBRATION_KEYS = with_meanings(
     force_levels: levels that the known forces gave
     force_error: standard deviation of a force that is read, as a share of it
     """,
-    Key("map_along", list, None, low=-0.15, high=0.15, length=6),
-    Key("map_around", list, None, low=-0.15, high=0.15, length=6),
+    Key("map_along", list, None, low=-0.25, high=0.25, length=6),
+    Key("map_around", list, None, low=-0.25, high=0.25, length=6),
     Key("map_error_mm", float, None, low=0.0, high=100.0),
     Key("map_note", str, ""),
     Key("map_sheet_ohm", list, None, low=1e-3, high=1e9, length=2),
