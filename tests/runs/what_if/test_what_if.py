@@ -144,6 +144,13 @@ def test_a_touch_after_the_recording_was_lost_does_not_count() -> None:
     assert (touches, len(delays)) == (1, 1)
 
 
+def test_a_touch_as_the_run_ends_counts_where_it_was_seen() -> None:
+    prompt, late = _TouchLabel(1.0, 1.5), _TouchLabel(2.93, 3.5)
+    assert _score_detection(contacts(1.01, 2.94), [prompt, late], 103.0) == (2, 0, pytest.approx([0.01, 0.01]))
+    assert _score_detection(contacts(1.01), [prompt, late], 103.0) == (1, 0, pytest.approx([0.01]))
+    assert _score_detection(contacts(1.01), [prompt, late], 103.04) == (2, 0, pytest.approx([0.01]))
+
+
 def test_recorded_contacts_are_labels_until_the_touch_is_over() -> None:
     events = [
         GuardEvent(EventName.CONTACT, 101.0, {"sensor": "a"}),

@@ -118,16 +118,19 @@ def _recorded_labels(recorded: Decisions) -> list[_TouchLabel]:
 
 
 _LATE_TIME = 0.1  # s after the end of a touch in which the skin still relaxes
+_SEEING_TIME = 0.1  # s that a touch may take to be seen: one that begins later before the end is not missed
 
 
-def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> tuple[int, int, list[float]]:
+def _score_detection(
+    decisions: Decisions, labels: Sequence[_TouchLabel], until: float = math.inf
+) -> tuple[int, int, list[float]]:
     """Return how many touches there were, the contacts without one, and the delay of each touch that was seen [s].
 
     A contact belongs to the touch of its sensor in whose time it begins; a second one in the same touch is no false
     alarm. A delay is negative where the touch was seen before it began. A touch that begins where inputs are missing
     is left out.
     """
-    known = decisions.until - decisions.start
+    known = min(decisions.until, until) - decisions.start
     counted = [label for label in labels if label.start < known]
     first: dict[_TouchLabel, float] = {}
     false_alarms = 0
@@ -144,10 +147,10 @@ def _score_detection(decisions: Decisions, labels: Sequence[_TouchLabel]) -> tup
             first.setdefault(min(own, key=lambda one: abs(one.start - time)), time)
         else:
             false_alarms += 1
-    return len(counted), false_alarms, [time - label.start for label, time in first.items()]
+    touches = sum(label in first or label.start < known - _SEEING_TIME for label in counted)
+    return touches, false_alarms, [time - label.start for label, time in first.items()]
 
 
-_SEEING_TIME = 0.1  # s that a touch may take to be seen: one that begins later before the end of a run is none of it
 AS_RECORDED = "as recorded"  #: name of the variant without other settings
 
 
@@ -206,7 +209,7 @@ def judge_run(path: Path, variants: _Variants = ({},), progress: Progress = sile
         except ConeSkinError as exc:
             rows.append(_row(**fixed, variant=name, error=str(exc)))
             continue
-        facts = _judge(recorded, again, labels, truth)
+        facts = _judge(recorded, again, labels, truth, run.span[1])
         rows.append(_row(**fixed, variant=name, complete=run.complete, duration_s=duration, **facts))
     return rows
 
@@ -224,13 +227,15 @@ def _truth(path: Path, run: Run, recorded: Decisions) -> tuple[list[_TouchLabel]
     touches = _true_touches(run)
     if touches is None:
         return _recorded_labels(recorded), "recorded"
-    since, until = (time - run.start for time in run.span)
-    return [touch for touch in touches if touch.end > since and touch.start < until - _SEEING_TIME], "virtual skin"
+    since = run.span[0] - run.start
+    return [touch for touch in touches if touch.end > since], "virtual skin"
 
 
-def _judge(recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel], truth: str) -> dict[str, Any]:
+def _judge(
+    recorded: Decisions, again: Decisions, labels: Sequence[_TouchLabel], truth: str, until: float = math.inf
+) -> dict[str, Any]:
     comparison = compare_decisions(recorded, again)
-    touches, false_alarms, delays = _score_detection(again, labels)
+    touches, false_alarms, delays = _score_detection(again, labels, until)
     known = truth != "recorded"
     return {
         "same": comparison.same,
