@@ -31,6 +31,7 @@ BENCHES = {
         "bench.loop.exploration",
         "States that differ in a time or a number only: of each abstract state one is followed.",
     ),
+    "parts": Bench("bench.loop.parts", "State in dictionaries and lists that stay the same ones; what objects share."),
     "processes": Bench("bench.loop.processes", "A real controller, which sends as much, and a real port."),
     "busy": Bench("bench.loop.busy", "A real controller and a real skin, which this computer does not hold up."),
     "publish": Bench("bench.loop.publish", "Subscribers on another computer."),

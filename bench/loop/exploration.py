@@ -1,6 +1,6 @@
 """Exploration of the guard to the end of its states, and of the processes around it.
 
-    python -m bench exploration [--wrong 1] [--compiled]
+    python -m bench exploration [--wrong 1] [--compiled] [--parallel 2]
 
 The core is fed what a guard is fed, by a world in which anything may happen at any time, as long as so many things are
 wrong at once. States are abstract: the phase and the facts that decide, without times and numbers. Each invariant is
@@ -14,6 +14,7 @@ import math
 import os
 import subprocess
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from bench.report import head, show
@@ -40,12 +41,17 @@ def row(name: str, found: Exploration, invariants: int) -> list[str]:
     return [name, *sizes, closed, str(invariants), broken, f"{found.seconds:.1f}"]
 
 
-def explore_guard(wrong: int) -> bool:
+def explore_one(settings: Settings) -> Exploration:
+    return explore(GuardWorld(settings), PROGRESS)
+
+
+def explore_guard(wrong: int, parallel: int) -> bool:
     rows, whole = [], True
-    for control in CONTROLS:
-        for reaction in REACTIONS:
-            found = explore(GuardWorld(Settings(reaction, control, most_wrong=wrong)), PROGRESS)
-            rows.append(row(f"{reaction}, {control}", found, len(INVARIANTS)))
+    cases = [Settings(reaction, control, most_wrong=wrong) for control in CONTROLS for reaction in REACTIONS]
+    with ProcessPoolExecutor(parallel) as pool:
+        for settings, found in zip(cases, pool.map(explore_one, cases), strict=True):
+            rows.append(row(f"{settings.reaction}, {settings.control}", found, len(INVARIANTS)))
+            print(*rows[-1], file=sys.stderr)
             whole = whole and found.closed and not found.broken
             for way, said in found.broken.values():
                 print(f"{said}\n  after: {', '.join(way)}")
@@ -93,15 +99,16 @@ def break_each() -> bool:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--wrong", type=int, default=1, help="things that may be wrong at once")
+    parser.add_argument("--parallel", type=int, default=os.cpu_count(), help="cases at a time (%(default)s)")
     parser.add_argument("--compiled", action="store_true", help="explore build/compiled")
     options = parser.parse_args()
     compiled = ROOT / "build" / "compiled"
     if options.compiled and str(compiled) not in os.environ.get("PYTHONPATH", ""):
         paths = os.pathsep.join([str(compiled), str(ROOT)])
-        words = [sys.executable, "-m", "bench", "exploration", "--compiled", "--wrong", str(options.wrong)]
+        words = [sys.executable, "-m", "bench", "exploration", *sys.argv[1:]]
         return subprocess.run(words, cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, check=False).returncode
     print(head())
-    whole = explore_guard(options.wrong)
+    whole = explore_guard(options.wrong, options.parallel)
     if not options.compiled:
         whole = explore_processes() & break_each() & whole
     return 0 if whole else 1

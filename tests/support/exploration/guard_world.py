@@ -273,7 +273,7 @@ class GuardWorld:
         assert arm is not None
         facts: list[object] = [core.phase, self.arm.speed > 0.01, self.arm.safety_bits, self.wrong.key()]
         facts += [
-            bool(core._faults),
+            bool(core._faults) and not (core.phase.stopping or core.phase is Phase.LATCHED),  # what a reset forgives
             activation.resetting,
             activation._way.released_at is None,
             judge.waiting < math.inf,
