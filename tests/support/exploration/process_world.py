@@ -188,7 +188,7 @@ class ProcessWorld:
         fine = state.program_age <= _ticks(parts.program_silence) and state.helper_age <= _ticks(parts.process_silence)
         lives = state.program == state.guard == state.helper == state.second == _ALIVE
         if lives and fine and heard and not state.touched:
-            self.state = replace(state, latched=False, moves=True, wrong_for=0)
+            self.state = replace(state, latched=False, moves=True, wrong_for=0, kick_age=0)  # its program starts again
 
     def _tick(self, lost: bool) -> list[str]:
         """Let a tick pass: beats, what each notices, and what comes of it."""
