@@ -106,7 +106,7 @@ def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]
 
 _AFFINE_TERMS = 3
 _AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset and gain, and of shear
-_CAUSES = (
+_ERROR_CAUSES = (
     *((name, 0.0) for name in SHEET_CLASSES),
     *(("ideal", width) for width in (0.005, 0.02, 0.06)),
 )  # of bends: a class of sheets, or any with a standard deviation of the terms that bend
@@ -325,7 +325,7 @@ def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: f
     """
     missing, count, fits = axis.missed, len(axis.missing), []
     every = _Axis(*map(np.concatenate, zip(axis, sheet, strict=True)))
-    for cause in _CAUSES:
+    for cause in _ERROR_CAUSES:
         name, bend = cause
         flaws = _flaws(SHEET_CLASSES[name], ohms, every)
         for affine, shear, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _REST_RATIOS):
@@ -334,12 +334,14 @@ def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: f
             noise = (ratio * mark_error) ** 2
             inverse = np.linalg.inv(prior[:count, :count] + noise * np.eye(count))
             likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
-            absent = (affine, shear, ratio - 1.0, _CAUSES.index(cause)).count(0)
+            absent = (affine, shear, ratio - 1.0, _ERROR_CAUSES.index(cause)).count(0)
             gain = prior[count:, :count] @ inverse
             alone = inverse @ missing / np.diag(inverse)  # what is missing to what the other touches say
             covariance = prior[count:, count:] - gain @ prior[:count, count:]
             rest = noise - mark_error**2
-            fits.append((likely + absent * math.log(_SIMPLER_ODDS), gain, covariance, alone, rest, cause != _CAUSES[0]))
+            fits.append(
+                (likely + absent * math.log(_SIMPLER_ODDS), gain, covariance, alone, rest, cause != _ERROR_CAUSES[0])
+            )
     odds, gains, covariances, alones, rests, bent = (np.array(each) for each in zip(*fits, strict=True))
     weights = np.exp(odds - odds.max())
     weights /= weights.sum()
