@@ -4,13 +4,14 @@ import json
 import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.tolerance import COATED_SHEETS, SheetTolerance
+from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, PlaceFloor, SheetTolerance
 from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, _Sheet, build_specimen, draw_flaws
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.field_contacts import FieldContacts
@@ -55,6 +56,15 @@ def test_what_peels_off_narrows_the_way_of_the_current() -> None:
     bare = np.array(BuiltSheets((SheetFlaws(peeled=0.2), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
     ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
     assert 0.9 * ideal[0, 0] < bare[0, 0] < 0.999 * ideal[0, 0]
+
+
+def test_the_floor_holds_a_fifth_of_an_electrode_that_no_reading_shows_to_have_peeled_off() -> None:
+    size, x = (0.24, 0.229), np.arange(49) / 48
+    off = size[0] * (_Sheet(SheetFlaws(peeled=0.2), size, 1000.0).answer[:2401, 1].reshape(49, 49) - x[:, None])
+    for tolerance, held in ((FILM_SHEETS, True), (replace(FILM_SHEETS, peel=0.0), False)):
+        floor = PlaceFloor(tolerance, size, (1048.0, 954.0))
+        variances = np.array([[floor.at(a, b, 0.0, 0.0)[0] for b in x] for a in x])
+        assert bool(np.mean(off**2 < 3.84 * variances) > 0.93) is held
 
 
 @pytest.mark.parametrize(("slope", "across", "skew", "stretch"), [(0.2, 0.1, 0.05, 0.1), (-0.3, 0.0, -0.1, 0.0)])

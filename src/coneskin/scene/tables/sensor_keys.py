@@ -110,7 +110,8 @@ _SHEET_KEYS = with_meanings(
     upper_sheet_ohm: resistance of the upper conductive layer per square
     lower_sheet_ohm: resistance of the lower conductive layer per square
     sheet_class: how uniform they are: `film` (sputtered or printed, as of touch panels), `coated` (hand-cut carbon
-        film, textile) or `ideal`. Without a calibration, the doubt of each place follows from it
+        film, textile) or `ideal`. Without a calibration, the doubt of each place follows from it; it holds a fifth of
+        an electrode that has peeled off, too, which no reading shows
     """,
     Key("upper_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
     Key("lower_sheet_ohm", float, 1000.0, low=1e-3, high=1e9),
