@@ -8,7 +8,7 @@ example:
   coneskin demo                          about 15 s; writes runs/demo-.../
   coneskin demo --reaction stop --json
 
-exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
+Exit code: 0 only if the stop was seen in measured joint speed and the replay gave the same events.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import threading
 import time
 from collections.abc import Iterable
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,7 +178,8 @@ def _print_report(facts: dict[str, Any], folder: Path, missing: str) -> None:
     if missing:
         print(f"recording: {missing}")
     print(f"written to {folder}: run.rec, scene.toml, summary.json" + (", run.png" if facts["picture"] else ""))
-    print_hint(f"see it in a browser: coneskin view {shlex.quote(str(folder))}")
+    view = "" if find_spec("viser") else " (after pip install 'coneskin[view]')"
+    print_hint(f"see it in a browser{view}: coneskin view {shlex.quote(str(folder))}")
     print_hint(f"next: coneskin replay {shlex.quote(str(folder))} --events")
 
 

@@ -2,9 +2,9 @@
 
 example:
   coneskin guard scene.toml              until Ctrl-C; type "reset" and Enter after a collision
-  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm;
-                                         where the scene has bodies, the arm runs into them (extra physics)
+  coneskin guard scene.toml --simulated --once   as `coneskin init --simulated` wrote it: a touch stops a simulated arm
 
+A simulated arm runs into the scene's [[body]] tables, where there are any (pip install 'coneskin[physics]').
 Keys of a scene: docs/look-up/scene.md. Exit code: 0 nothing happened, 1 a mistake or a fault, 3 a collision; Ctrl-C and
 SIGTERM do not change it. `coneskin doctor scene.toml --check` tells whether a guard can start with a scene.
 coneskin is not a safety-rated device; read docs/safety.md before you use it.

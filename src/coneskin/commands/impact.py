@@ -9,7 +9,7 @@ example:
 
 The scene needs an [arm], a [motion], skins and at least one [[body]] in the way of a skin (docs/do/impact.md).
 
-exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise.
+Exit code: 0 if the arm met a body and the guard noticed it; 1 otherwise.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _COLUMN_NAMES = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    add("scene", type=Path, help="scene file")
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     help_text = "what protects the body: guard (as the scene says), a reaction, force limit, nothing (default: all)"
     add("--ways", default=",".join(_STOP_WAYS), help=help_text)
     add("--seed", type=int, default=0, help="of the skins' noise (default 0)")

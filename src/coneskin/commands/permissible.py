@@ -7,7 +7,7 @@ The scene needs an [arm], skins and their [padding]; with a [motion] the speeds 
 limits are yours: docs/do/permissible-speed.md lists the keys. A scene whose [arm] has speed_limit_from = "impact.toml"
 lets the guard keep the speeds. A model with assumed servos; no safety assessment.
 
-exit code: 0; 1 where no speed keeps the limits, or a file has a mistake.
+Exit code: 0; 1 where no speed keeps the limits, or a file has a mistake.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of the command."""
     add = parser.add_argument
-    add("scene", type=Path, help="scene file")
+    add("scene", type=Path, metavar="SCENE", help="scene file, TOML")
     add("--limits", type=Path, required=True, metavar="FILE", help="limits of the force, and how the arm stops")
     add("-o", "--output", type=Path, metavar="FILE", help="write the speeds as TOML for speed_limit_from")
     add("--picture", type=Path, metavar="FILE", help="draw them (png, svg, pdf; extra pictures)")

@@ -2,8 +2,9 @@
 
 examples:
   coneskin unroll --radius1-mm 40 --radius2-mm 70 --height-mm 150
-  coneskin unroll --radius1-mm 54 --height-mm 434 --wrap-deg 300 --json     (a cylinder: one radius is enough)
+  coneskin unroll --radius1-mm 54 --height-mm 434 --wrap-deg 300 --json
 
+One radius is enough for a cylinder.
 r1 belongs to radius 1 and r2 to radius 2, so r1 > r2 where the link narrows. The sector of a cylinder is a rectangle:
 r1 and r2 are infinite (null in JSON), theta0 is 0, and arc1 is the width.
 Exit code: 0; 1 there is no such cone; 2 wrong usage.
