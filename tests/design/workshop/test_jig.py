@@ -12,6 +12,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.jig import Collar, _CollarPart, _LinkExcess, _lip_play, jig_collars
+from coneskin.design.workshop.placement import find_placement
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
@@ -241,6 +242,18 @@ def test_a_link_that_ends_with_its_sheet_has_no_lip() -> None:
     collars, said = jig_collars(design, tube())
     assert collars == ()
     assert "end 1 lies where the link ends: keep the sheet flush with its rim" in said
+
+
+def test_an_end_too_near_to_the_rim_for_a_lip_is_as_far_from_it_as_its_place_says() -> None:
+    design = sheet(Frustum(0.05, 0.05, 0.2716), Pose(translation=(0.0, 0.0, -0.0258)))
+    collars, said = jig_collars(design, tube())
+    place = find_placement(design.place, tube())
+    assert collars == ()
+    assert place.before is not None
+    assert place.beyond is not None
+    assert "flush" not in "".join(said)
+    assert f"end 1 lies {1e3 * place.before:.1f} mm before the outermost place of the link" in said[0]
+    assert f"end 2 lies {1e3 * place.beyond:.1f} mm before the outermost place of the link" in said[1]
 
 
 @pytest.mark.parametrize("height", [0.0, 0.02])

@@ -219,6 +219,7 @@ _FLUSH_DISTANCE = 40e-3  # m; an outermost face nearer than this is the datum of
 _MAX_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
 _MIN_LIP_PIECE = 1e-3  # m; a lip is left out where it would be shorter
 _WIRES = "the tabs or wires of {0} are in the way: mark the line of the rim, and push the sheet against that"
+_FLUSH_RIM = 0.5e-3  # m; an end so near to the rim is flush with it
 _MIN_LIP = 4e-3  # m; a lip that is shorter everywhere holds nothing
 _SLOT_WIDTH = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
 _CHANNEL_HEIGHT = 8e-3  # m; height of the way out for tabs with their wires
@@ -328,11 +329,13 @@ class _Builder:
         self.sign = -1.0 if end == 1 else 1.0
         sheet_end = min(0.0, -lift) if end == 1 else self.side.height + max(0.0, -lift)
         self.step = sheet_end + self.sign * self.plan.clearance
-        self.room: float | None = None
+        self.rim: float | None = None  # from the end of the sheet to the rim of the link [m]
+        self.room: float | None = None  # the same from the step
         pose = design.place.link_frustum.inverse()
         if mesh is not None:
-            z = mesh.vertices @ np.array(pose.rotation[2]) + pose.translation[2]
-            self.room = float(self.step - z.min() if end == 1 else z.max() - self.step)
+            z = self.sign * (mesh.vertices @ np.array(pose.rotation[2]) + pose.translation[2])
+            self.rim = float(z.max()) - (0.0 if end == 1 else self.side.height)
+            self.room = float(z.max()) - self.sign * self.step
         self.flush = self.room is not None and _MIN_LIP <= self.room <= _FLUSH_DISTANCE
         self.wanted = self.room if self.flush and self.room is not None else self.plan.grip
         self.link = _LinkExcess(self.side, self.step, self.sign, self.wanted + self.plan.clearance, body, pose)
@@ -350,7 +353,12 @@ class _Builder:
         if self.room is not None:
             wanted = min(wanted, self.room)
         if wanted < _MIN_LIP:
-            raise _NoRoomError(f"end {self.end} lies where the link ends: keep the sheet flush with its rim")
+            if self.rim is None or self.rim < _FLUSH_RIM:
+                raise _NoRoomError(f"end {self.end} lies where the link ends: keep the sheet flush with its rim")
+            raise _NoRoomError(
+                f"end {self.end} lies {1e3 * self.rim:.1f} mm before the outermost place of the link, too little for a "
+                "lip: place it by the distances above"
+            )
         spans = self._spans()
         free = [self._lip_lengths(np.linspace(*span), wanted) for span in spans]
         longest = max(float(lengths.max()) for lengths in free)
