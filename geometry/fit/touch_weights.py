@@ -12,7 +12,7 @@ import numpy as np
 
 from coneskin.core.arrays import Floats, frozen
 from coneskin.core.errors import GeometryError
-from coneskin.core.files import read_file
+from coneskin.core.files import read_text
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import perpendicular_vectors
@@ -88,12 +88,7 @@ def read_touch_weights(path: str | Path) -> TouchWeights:
         GeometryError: the file cannot be read, a column is missing, or a value is no number or out of range.
     """
     path = Path(path)
-    try:
-        text = read_file(path, _MAX_SIZE).decode("utf-8-sig")
-    except OSError as exc:
-        raise GeometryError(f"{path}: {exc.strerror or exc}") from exc
-    except UnicodeDecodeError as exc:
-        raise GeometryError(f"{path}: a map of weights is a text file, and byte {exc.start} is not UTF-8") from exc
+    text = read_text(path, _MAX_SIZE, "the text of a map of weights", lambda why: GeometryError(f"{path}: {why}"))
     rows = csv.DictReader(io.StringIO(text))
     head = [name.strip() for name in rows.fieldnames or ()]
     missing = [name for name in _MAP_COLUMNS if name not in head]

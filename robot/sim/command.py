@@ -24,7 +24,7 @@ from pathlib import Path
 
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, RobotRefused
-from coneskin.core.files import read_file
+from coneskin.core.files import explain_os_error, read_file
 from coneskin.core.help_text import HelpFormatter
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
@@ -122,10 +122,8 @@ def run(args: argparse.Namespace) -> int:
         )
     parent = os.getppid()
     with ExitStack() as stack:
-        try:
+        with explain_os_error(RobotRefused, f"--log {args.log} cannot be written"):
             log = stack.enter_context(args.log.open("w", buffering=1)) if args.log else None
-        except OSError as exc:
-            raise RobotRefused(f"--log {args.log} cannot be written: {exc.strerror}") from exc
         plant = None if args.plant_descriptor is None else _plant(args.plant_descriptor, options)
         controller = Controller(options, log, plant)
         server = stack.enter_context(Server(controller, args.host, faults=args.faults))
@@ -180,10 +178,8 @@ def _version(text: str) -> Version:
 
 
 def _plant(descriptor: int, options: Options) -> RemotePlant:
-    try:
+    with explain_os_error(RobotRefused, f"--plant-descriptor {descriptor} is no line to a plant"):
         return RemotePlant(Channel(socket.socket(fileno=descriptor)), options.start_q, arm_model(options.model))
-    except OSError as exc:
-        raise RobotRefused(f"--plant-descriptor {descriptor} is no line to a plant: {exc.strerror}") from exc
 
 
 def _address(text: str) -> tuple[str, int]:

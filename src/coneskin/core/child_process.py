@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from .channel import Channel
 from .errors import RobotConnectionError
+from .files import explain_os_error
 
 if TYPE_CHECKING:  # a child needs it for nothing else, and it takes a while to import
     import subprocess
@@ -59,21 +60,19 @@ def spawn(module: str, *ends: socket.socket) -> subprocess.Popen[bytes]:
 
     _check_memory()
     command = [sys.executable, "-I" if sys.flags.isolated else "-P", "-m", module]
-    try:
-        with contextlib.ExitStack() as stack:
-            numbers = [end.fileno() for end in ends]
-            if hasattr(os, "pidfd_open"):  # Linux, from 5.3 on
-                with contextlib.suppress(OSError):
-                    numbers.append(os.pidfd_open(os.getpid()))
-                    stack.callback(os.close, numbers[-1])
-            child = subprocess.Popen(
-                [*command, str(len(ends)), *map(str, numbers)],
-                pass_fds=numbers,
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,
-            )
-    except OSError as exc:
-        raise RobotConnectionError(f"cannot start the process {module}: {exc.strerror or exc}") from exc
+    failure = explain_os_error(RobotConnectionError, f"cannot start the process {module}")
+    with failure, contextlib.ExitStack() as stack:
+        numbers = [end.fileno() for end in ends]
+        if hasattr(os, "pidfd_open"):  # Linux, from 5.3 on
+            with contextlib.suppress(OSError):
+                numbers.append(os.pidfd_open(os.getpid()))
+                stack.callback(os.close, numbers[-1])
+        child = subprocess.Popen(
+            [*command, str(len(ends)), *map(str, numbers)],
+            pass_fds=numbers,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
     for end in ends:
         end.close()
     return child

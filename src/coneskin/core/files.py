@@ -55,6 +55,26 @@ def read_file(path: Path, limit: int) -> bytes:
     return data
 
 
+def read_text(path: Path, limit: int, what: str, refusal: Callable[[str], ConeSkinError], hint: str = "") -> str:
+    """Return the text of a file of at most so many bytes, without the byte-order mark that some editors put in front.
+
+    Args:
+        path: of the file, in UTF-8.
+        limit: [bytes].
+        what: is wanted, such as "a TOML text".
+        refusal: makes the error of a text.
+        hint: where the file cannot be read.
+
+    Raises:
+        ConeSkinError: as ``refusal`` makes it: it cannot be read, is longer, or is no text.
+    """
+    with explain_os_error(refusal, "the file cannot be read", hint):
+        try:
+            return read_file(path, limit).decode("utf-8-sig")
+        except UnicodeDecodeError as exc:
+            raise refusal(f"this is not {what}: byte {exc.start} cannot stand in UTF-8; save it as UTF-8 text") from exc
+
+
 def open_file(path: Path, limit: int) -> BinaryIO:
     """Open a regular file of at most so many bytes for reading, without waiting for anything; a link is followed.
 

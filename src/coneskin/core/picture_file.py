@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .errors import ConeSkinError, MissingExtra
+from .files import explain_os_error
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,12 +67,11 @@ def write_picture(
         raise MissingExtra("matplotlib", "a picture", "pictures") from exc
     matplotlib.use("Agg", force=False)
     # a name may have dollars in it; an overflow would be a warning, and a picture of nothing
-    with picture_style(), np.errstate(over="raise"):
+    failure = explain_os_error(refusal, f"{what} cannot be written to {path}", "; name another file")
+    with failure, picture_style(), np.errstate(over="raise"):
         try:
             compose().savefig(path, dpi=dpi)
         except ConeSkinError:
             raise
-        except OSError as exc:
-            raise refusal(f"{what} cannot be written to {path}: {exc.strerror or exc}; name another file") from exc
         except (ArithmeticError, ValueError) as exc:  # matplotlib's, for times or lengths of any size
             raise refusal(f"{what} cannot be drawn: its times or values have no common scale: {exc}") from exc

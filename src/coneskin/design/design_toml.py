@@ -15,10 +15,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from coneskin.core.errors import GeometryError, SceneError
-from coneskin.core.files import read_file
 from coneskin.core.keys import Key, check, with_meanings
 from coneskin.core.text import suggest
-from coneskin.core.toml_text import parse_toml
 from coneskin.geometry.drawing.cut_sheet import FaceUp
 from coneskin.geometry.drawing.dxf import ArcStyle
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
@@ -27,6 +25,7 @@ from coneskin.geometry.drawing.pdf import PageSize
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.scene.tables.keys import MAX_SIZE
 from coneskin.scene.tables.sensor_keys import SENSOR_KEYS
+from coneskin.scene.tables.sensor_tables import read_toml
 from coneskin.skin.electronics import GivenElectronics
 
 from .folder import FileOptions
@@ -221,13 +220,13 @@ def read_settings(path: Path | None = None, words: Sequence[str] = ()) -> _Desig
         words: settings such as "drawings.kerf_mm=0.2", which go before those of the file.
 
     Raises:
-        SceneError: the file has mistakes; a line for each.
-        GeometryError: the file cannot be read, or a setting in the words is wrong.
+        SceneError: the file cannot be read, or has mistakes; a line for each.
+        GeometryError: a setting in the words is wrong.
     """
     values: dict[str, dict[str, Any]] = {name: {} for name in DESIGN_TABLES}
     if path is not None:
         problems: list[str] = []
-        _add(values, _tables(path), "", problems, path.parent)
+        _add(values, read_toml(path, MAX_SIZE, "the options", problems), "", problems, path.parent)
         if problems:
             raise SceneError(problems, str(path))
     for word in words:
@@ -236,15 +235,6 @@ def read_settings(path: Path | None = None, words: Sequence[str] = ()) -> _Desig
         if problems:
             raise GeometryError(problems[0])
     return _settings(values)
-
-
-def _tables(path: Path) -> dict[str, Any]:
-    try:
-        return parse_toml(read_file(path, MAX_SIZE).decode("utf-8-sig"))
-    except OSError as exc:
-        raise GeometryError(f"{path} cannot be read: {exc.strerror or exc}") from exc
-    except ValueError as exc:  # not TOML, or not UTF-8
-        raise GeometryError(f"{path} is not TOML: {exc}") from exc
 
 
 def _setting(word: str) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError
+from coneskin.core.files import explain_os_error
 from coneskin.core.text import printable, read_json
 from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
@@ -99,11 +100,9 @@ def _new_folder(target: Path, replace: bool = False) -> Iterator[Path]:
     """Open a temporary folder that becomes the target if the block succeeds, and is removed if it fails."""
     target = Path(os.path.realpath(target))
     check_target(target, replace)
-    try:
+    with explain_os_error(GeometryError, f"{target} cannot be written"):
         target.parent.mkdir(parents=True, exist_ok=True)
         draft = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    except OSError as exc:
-        raise GeometryError(f"{target} cannot be written: {exc.strerror or exc}") from exc
     try:
         yield draft
         draft.chmod(0o755)  # mkdtemp makes it private
@@ -124,12 +123,10 @@ def _replace(target: Path, draft: Path) -> None:
     old = Path(tempfile.mkdtemp(prefix=f".{target.name}-old-", dir=target.parent))
     target.replace(old)
     draft.replace(target)
-    try:
+    with explain_os_error(GeometryError, f"{old} still has files of yours", "; the new design is whole"):
         for name in own:
             (target / name).parent.mkdir(parents=True, exist_ok=True)
             (old / name).replace(target / name)
-    except OSError as exc:
-        raise GeometryError(f"{old} still has files of yours: {exc.strerror or exc}; the new design is whole") from exc
     shutil.rmtree(old)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import KinematicsError, SceneError
-from coneskin.core.files import read_file
+from coneskin.core.files import read_text
 from coneskin.core.keys import check
 from coneskin.core.text import suggest
 from coneskin.core.toml_text import parse_toml
@@ -45,13 +45,7 @@ def load_scene(path: Path | str, *, calibrated: bool = True) -> s.Scene:
         SceneError: the file cannot be read, or has mistakes; all of them are listed.
     """
     path = Path(path)
-    try:
-        text = read_file(path, MAX_SIZE).decode("utf-8-sig")  # some editors put a byte-order mark in front
-    except UnicodeDecodeError as exc:
-        what = f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8; save the scene as UTF-8 text"
-        raise SceneError([what], str(path)) from exc
-    except OSError as exc:
-        raise SceneError([f"the file cannot be read: {exc.strerror or exc}"], str(path)) from exc
+    text = read_text(path, MAX_SIZE, "a TOML text", lambda why: SceneError([why], str(path)))
     return parse_scene(text, path.name, path.parent, calibrated=calibrated)
 
 

@@ -71,7 +71,7 @@ def test_a_wrong_map_is_refused_by_name_and_line(text: str, words: str, tmp_path
 
 def test_a_map_that_is_no_text_or_not_there_is_refused(tmp_path: Path) -> None:
     (tmp_path / "map.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(GeometryError, match="a map of weights is a text file, and byte 0 is not UTF-8"):
+    with pytest.raises(GeometryError, match="this is not the text of a map of weights: byte 0 cannot stand in UTF-8"):
         read_touch_weights(tmp_path / "map.csv")
     with pytest.raises(GeometryError, match="No such file"):
         read_touch_weights(tmp_path / "none.csv")

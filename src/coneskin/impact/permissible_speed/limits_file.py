@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from coneskin.core.errors import ConeSkinError, SceneError
-from coneskin.core.files import read_file
+from coneskin.core.files import read_text
 from coneskin.core.keys import Key, check
 from coneskin.core.text import suggest
 from coneskin.core.toml_text import parse_toml
@@ -118,13 +118,8 @@ def read_limits(path: Path | str) -> LimitsFile:
         SceneError: the file cannot be read, or has mistakes; all of them are listed.
     """
     path = Path(path)
-    try:
-        text = read_file(path, MAX_SIZE).decode("utf-8-sig")
-    except OSError as exc:
-        hint = "; docs/do/permissible-speed.md has one to begin with" if isinstance(exc, FileNotFoundError) else ""
-        raise SceneError([f"the file cannot be read: {exc.strerror or exc}{hint}"], str(path)) from exc
-    except UnicodeDecodeError as exc:
-        raise SceneError([f"this is not a TOML text: byte {exc.start} cannot stand in UTF-8"], str(path)) from exc
+    hint = "" if path.exists() else "; docs/do/permissible-speed.md has one to begin with"
+    text = read_text(path, MAX_SIZE, "a TOML text", lambda why: SceneError([why], str(path)), hint)
     return _parse_limits(text, path.name)
 
 
