@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coneskin.core.arrays import Floats
-from coneskin.core.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, needed_package
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.pose import Pose
 
@@ -108,10 +108,8 @@ def require_step_writer() -> None:
     Raises:
         MissingExtra: cadquery-ocp is not installed.
     """
-    try:
+    with needed_package("cadquery-ocp-novtk", "writing a STEP file", "cad"):
         import OCP  # noqa: F401
-    except ImportError as exc:
-        raise MissingExtra("cadquery-ocp-novtk", "writing a STEP file", "cad") from exc
 
 
 def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:

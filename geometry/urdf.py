@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from coneskin.core.errors import MeshError, MissingExtra
+from coneskin.core.errors import MeshError, needed_package
 from coneskin.core.files import read_file
 
 from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
@@ -29,11 +29,9 @@ def _expand_xacro(
 ) -> bytes:
     """Return the URDF that a xacro file describes, in UTF-8; paths of meshes beside it become absolute."""
     path = Path(path)
-    try:
+    with needed_package("xacrodoc", f"expanding {path.name}", "xacro"):
         from xacrodoc import XacroDoc
         from xacrodoc import packages as finder
-    except ImportError as exc:
-        raise MissingExtra("xacrodoc", f"expanding {path.name}", "xacro") from exc
     try:
         # what was found for another file must not be taken for this one
         finder.reset()

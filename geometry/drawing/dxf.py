@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, Literal, get_args
 
-from coneskin.core.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, needed_package
 
 from .cut_sheet import CutSheet
 from .outline import Outline, PathSegment, joint_bounds
@@ -37,11 +37,9 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
     """
     if arcs not in get_args(ArcStyle):
         raise GeometryError(f"arcs must be one of {', '.join(get_args(ArcStyle))}, got {arcs!r}")
-    try:
+    with needed_package("ezdxf", "writing DXF files", "design"):
         import ezdxf
         from ezdxf.enums import TextEntityAlignment
-    except ImportError as exc:
-        raise MissingExtra("ezdxf", "writing DXF files", "design") from exc
 
     document = ezdxf.new("R2010", units=4)  # 4: millimetres
     document.header["$MEASUREMENT"] = 1

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from coneskin.core.errors import GeometryError, MissingExtra
+from coneskin.core.errors import GeometryError, needed_package
 
 from .cut_sheet import CutPart, CutSheet, Stroke
 
@@ -74,10 +74,8 @@ def nest_on_beds(
         GeometryError: the bed or the gap is out of range.
         MissingExtra: rectangle-packer is not installed.
     """
-    try:
+    with needed_package("rectangle-packer", "nesting parts on a bed", "design"):
         import rpack
-    except ImportError as exc:
-        raise MissingExtra("rectangle-packer", "nesting parts on a bed", "design") from exc
     if not (_MIN_BED_SIDE <= width <= _MAX_BED_SIDE and _MIN_BED_SIDE <= depth <= _MAX_BED_SIDE and 0.0 <= gap <= 0.1):
         raise GeometryError(
             f"a bed is from {_MIN_BED_SIDE * 1e3:g} to {_MAX_BED_SIDE * 1e3:g} mm wide and deep, with gaps from 0 to "

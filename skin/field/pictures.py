@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from coneskin.core.arrays import Floats
-from coneskin.core.errors import MissingExtra
+from coneskin.core.errors import needed_package
 
 from .maps import FieldMap
 from .sheet import SectorSheet
@@ -24,11 +24,9 @@ def make_figure(width: float, height: float, columns: int = 1) -> tuple[Any, lis
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    try:
+    with needed_package("matplotlib", "drawing the field", "pictures"):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtra("matplotlib", "drawing the field", "pictures") from error
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure, [figure.add_subplot(1, columns, number + 1) for number in range(columns)]

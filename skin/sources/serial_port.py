@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from coneskin.core.channel import wait_readable
-from coneskin.core.errors import MissingExtra, SkinConnectionError, SkinTimeout
+from coneskin.core.errors import SkinConnectionError, SkinTimeout, needed_package
 
 
 class PortFacts(NamedTuple):
@@ -38,10 +38,8 @@ def find_ports() -> list[PortFacts]:
     Raises:
         MissingExtra: pyserial is not installed.
     """
-    try:
+    with needed_package("pyserial", "listing serial ports"):
         from serial.tools import list_ports as tools
-    except ImportError as error:
-        raise MissingExtra("pyserial", "listing serial ports") from error
     found = []
     for port in sorted(tools.comports()):
         description = port.description if port.description not in (None, "n/a", port.name) else ""
@@ -97,10 +95,8 @@ class SerialPort:
         """
         if self._port is not None:
             return
-        try:
+        with needed_package("pyserial", "reading a serial port"):
             import serial
-        except ImportError as error:
-            raise MissingExtra("pyserial", "reading a serial port") from error
         try:
             port = serial.serial_for_url(self.name, self.baud, timeout=0, exclusive=True)
         except (serial.SerialException, OSError, ValueError, KeyError, re.error) as error:  # of odd URLs the last two

@@ -25,7 +25,8 @@ Mistakes in calling (a wrong type) stay TypeError.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -73,6 +74,15 @@ class MissingExtra(ConeSkinError, ImportError):
 
     def __reduce__(self) -> tuple[type[MissingExtra], tuple[str, str, str | None, str]]:
         return type(self), self._made_of
+
+
+@contextmanager
+def needed_package(package: str, job: str, extra: str | None = None) -> Iterator[None]:
+    """Let an ImportError in the ``with`` become a ``MissingExtra`` of these arguments."""
+    try:
+        yield
+    except ImportError as exc:
+        raise MissingExtra(package, job, extra) from exc
 
 
 class SkinError(ConeSkinError):

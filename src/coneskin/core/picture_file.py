@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import ConeSkinError, MissingExtra
+from .errors import ConeSkinError, needed_package
 from .files import explain_os_error
 
 if TYPE_CHECKING:
@@ -60,11 +60,9 @@ def write_picture(
         raise refusal(f"{what} is a {', '.join(_PICTURE_SUFFIXES)} file, got {path}")
     if not path.parent.is_dir():
         raise refusal(f"{what} cannot be written to {path}: there is no folder {path.parent}; make it first")
-    try:
+    with needed_package("matplotlib", "a picture", "pictures"):
         import matplotlib
         import numpy as np
-    except ImportError as exc:
-        raise MissingExtra("matplotlib", "a picture", "pictures") from exc
     matplotlib.use("Agg", force=False)
     # a name may have dollars in it; an overflow would be a warning, and a picture of nothing
     failure = explain_os_error(refusal, f"{what} cannot be written to {path}", "; name another file")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coneskin.core.errors import MissingExtra
+from coneskin.core.errors import needed_package
 from coneskin.core.picture_file import degree_ticks, picture_style
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
@@ -53,10 +53,8 @@ def draw_pictures(
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    try:
+    with needed_package("matplotlib", "drawing pictures (--no-pictures leaves them out)", "design"):
         from matplotlib.figure import Figure
-    except ImportError as exc:
-        raise MissingExtra("matplotlib", "drawing pictures (--no-pictures leaves them out)", "design") from exc
     (folder / "pictures").mkdir()
     done: list[tuple[str, str]] = []
 

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable
 from urllib.parse import urlsplit
 
-from coneskin.core.errors import MissingExtra, SceneError
+from coneskin.core.errors import SceneError, needed_package
 from coneskin.core.text import finite
 from coneskin.robot.guard.signals.journal import GuardEvent
 
@@ -40,10 +40,8 @@ def _open_zmq(host: str, port: int) -> _Channel:
 
     A message has two parts, the event's name, by which subscribers choose, and the JSON.
     """
-    try:
+    with needed_package("pyzmq", "publishing by ZeroMQ", "zmq"):
         import zmq
-    except ModuleNotFoundError as exc:
-        raise MissingExtra("pyzmq", "publishing by ZeroMQ", "zmq") from exc
     context = zmq.Context()
     sock = context.socket(zmq.PUB)
     sock.setsockopt(zmq.IPV6, ":" in host)
@@ -71,11 +69,9 @@ _MAX_TOPIC = 1000  # letters; a broker takes 65 535 bytes
 
 def _open_mqtt(host: str, port: int, topic: str, user: str | None, password: str | None) -> _Channel:
     """Connect to a broker, and again where the connection is lost. An event's topic is ``topic`` and its name."""
-    try:
+    with needed_package("paho-mqtt", "publishing by MQTT", "mqtt"):
         from paho.mqtt.client import Client, MQTTMessageInfo
         from paho.mqtt.enums import CallbackAPIVersion
-    except ModuleNotFoundError as exc:
-        raise MissingExtra("paho-mqtt", "publishing by MQTT", "mqtt") from exc
     answers: queue.SimpleQueue[str] = queue.SimpleQueue()
     waiting: deque[MQTTMessageInfo] = deque()
     ended = threading.Event()

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from coneskin.core.errors import ConeSkinError, MissingExtra
+from coneskin.core.errors import ConeSkinError, needed_package
 
 from .connection_gate import ALLOWED, UPLOADS, ConnectionGate
 
@@ -23,10 +23,8 @@ _starting = threading.Lock()
 
 
 def _viser() -> Any:
-    try:
+    with needed_package("viser", "the page in a browser", "view"):
         import viser
-    except ImportError as exc:
-        raise MissingExtra("viser", "the page in a browser", "view") from exc
     return viser
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coneskin.core.arrays import Floats
-from coneskin.core.errors import MissingExtra, SceneError
+from coneskin.core.errors import SceneError, needed_package
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.inertia import arm_inertia
 from coneskin.robot.arm.model import ArmModel
@@ -139,10 +139,8 @@ class MujocoPlant:
         period: int = 1,
         bare: Sequence[SheetOnLink] = (),
     ) -> None:
-        try:
+        with needed_package("mujoco", "physics in the loop", "physics"):
             import mujoco
-        except ImportError as exc:
-            raise MissingExtra("mujoco", "physics in the loop", "physics") from exc
         self._mj: Any = mujoco
         mujoco.set_mju_user_warning(lambda _: None)  # it would write a file into the current folder: see `diverged`
         inertia = arm_inertia(model)

@@ -15,7 +15,7 @@ from heapq import merge
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.errors import ConeSkinError, MissingExtra
+from coneskin.core.errors import ConeSkinError, needed_package
 from coneskin.core.progress import Progress, silent
 from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
@@ -57,10 +57,8 @@ def write_mcap(run: Run, path: Path, progress: Progress = silent) -> int:
         MissingExtra: mcap is not installed.
         SceneError: this version of coneskin cannot read the scene.
     """
-    try:
+    with needed_package("mcap", "an MCAP file", "mcap"):
         from mcap.writer import Writer
-    except ImportError as exc:
-        raise MissingExtra("mcap", "an MCAP file", "mcap") from exc
     messages = merge(*_streams(run, progress), key=lambda message: message.time)
     number = -1
     unix = run.unix_offset

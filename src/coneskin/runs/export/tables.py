@@ -13,7 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coneskin.core.errors import MissingExtra, RecordingError
+from coneskin.core.errors import RecordingError, needed_package
 from coneskin.core.files import explain_os_error
 from coneskin.core.progress import Progress, silent
 from coneskin.robot.arm.models import JOINT_COUNT
@@ -131,11 +131,9 @@ def write_parquet(path: Path, pieces: Iterable[Table]) -> int:
         MissingExtra: pyarrow is not installed.
         RecordingError: the file cannot be written.
     """
-    try:
+    with needed_package("pyarrow", "a Parquet file", "tables"):
         import pyarrow as pa
         import pyarrow.parquet as pq
-    except ImportError as exc:
-        raise MissingExtra("pyarrow", "a Parquet file", "tables") from exc
     rows = 0
     with explain_os_error(RecordingError, f"cannot write {path}"), ExitStack() as stack:
         writer = None

@@ -19,7 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coneskin.core.errors import ConeSkinError, MissingExtra, RecordingError
+from coneskin.core.errors import ConeSkinError, RecordingError, needed_package
 from coneskin.core.files import read_file
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
@@ -272,11 +272,9 @@ def _judge_on_cluster(
     address: str, paths: Sequence[Path], variants: _Variants, judge: _Judge
 ) -> Iterator[tuple[Path, Rows]]:
     """Yield each run with its rows, as the workers finish them. One on which a worker dies three times is an error."""
-    try:
+    with needed_package("distributed", "a Dask cluster", "dask"):
         from distributed import Client, as_completed
         from distributed.comm.addressing import parse_address, parse_host_port
-    except ImportError as exc:
-        raise MissingExtra("distributed", "a Dask cluster", "dask") from exc
     try:
         scheme, place = parse_address(address)
         # where no scheduler answers, a client hangs for minutes
