@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.design.link_picture import _reasons, draw_link, draw_weights
+from coneskin.design.link_picture import _name_ends, _reasons, _View, draw_link, draw_weights
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.fit.bare_areas import BareArea
 from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.pose import Pose
 
 figures = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
 COLOURS = pytest.importorskip("matplotlib.colors")
@@ -53,6 +54,19 @@ def test_a_sheet_hides_the_link_under_it_and_bare_ends_have_the_colours_of_their
         assert low == pytest.approx(0.23, abs=0.08)
         assert high == pytest.approx(0.23, abs=0.08)
     assert [line.get_label() for line in figure.axes[-1].lines][-2:] == ["bare, 25%: low", "bare, 25%: high"]
+
+
+@pytest.mark.parametrize("way", [(0.8, 0.3, 0.4), (-0.8, -0.3, 0.4), (0.9, 0.1, -0.2)])
+def test_the_line_from_the_name_of_an_end_does_not_cross_the_sheet_to_its_other_end(way: tuple[float, ...]) -> None:
+    lying = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.5 * math.pi, 0.0, 0.0))
+    (design,) = design_sheets([PlacedFrustum(Frustum(RADIUS, RADIUS, 0.06), lying)], DesignOptions())
+    axes = figures.Figure().add_subplot()
+    _name_ends(axes, [design], _View(tube().moved(lying), way))
+    one, two = sorted(axes.texts, key=lambda text: text.get_text())
+    assert [one.get_text(), two.get_text()] == ["sheet 1, end 1", "sheet 1, end 2"]
+    for text in (one, two):
+        outwards = math.copysign(1.0, text.xy[0] - 0.5 * (one.xy[0] + two.xy[0]))
+        assert outwards * (text.get_position()[0] - text.xy[0]) > 0.0, "the line leaves the sheet at once"
 
 
 def test_a_place_has_the_reason_of_most_samples_near_it() -> None:

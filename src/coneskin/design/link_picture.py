@@ -164,7 +164,7 @@ def draw_link(
 
     for side, (x, y, z) in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, -0.35))):
         # slightly from the side; once from above and once from below, so that both ends are seen
-        axes = figure.add_axes((0.5 * side, 0.14, 0.48, 0.84))
+        axes = figure.add_axes((0.57 * side, 0.14, 0.45, 0.84))
         view = _View(body, first.rotate((x, y, z)))
         view.draw(axes, colours, np.array(first.rotate((x, -0.3 * y, 1.3 * z))))
         view.draw_frame(axes)
@@ -200,25 +200,35 @@ def _draw_face(axes: Any, face: DatumFace, view: _View) -> None:
 
 
 def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
-    """Write the names of the sheets and of their ends beside the picture, with lines to where the viewer sees them."""
-    names: list[tuple[Any, str, str]] = []
+    """Write the names of the sheets and of their ends beside the picture, with lines to where the viewer sees them.
+
+    Each is on that side of the picture to which its end lies from the middle of the sheet, so that no line crosses the
+    sheet to its other end.
+    """
+    from matplotlib.patheffects import withStroke
+
+    below = {"left": -math.inf, "right": -math.inf}
+    names: list[tuple[Any, str, str, str]] = []
     for index, design in enumerate(designs):
         side = design.place.frustum
-        phi = np.linspace(0.0, side.wrap, 121)
+        phi = side.wrap * np.linspace(0.1, 0.9, 121)  # at a corner a name could be that of the edge
+        middle = view.flat(design.outer_face(np.full(len(phi), 0.5 * side.slant), phi)[0])[:, 0].mean()
         for end, u in ((1, 0.0), (2, side.slant)):
             points, normals = design.outer_face(np.full(len(phi), u), phi)
-            seen = view.sees(points, normals)
+            seen, flat = view.sees(points, normals), view.flat(points)
             if seen.mean() >= 0.2:  # else the other side shows it better
-                flat = view.flat(points[seen])
-                right = flat[flat[:, 0].argmax()]
+                where, sign = ("right", 1.0) if flat[:, 0].mean() >= middle else ("left", -1.0)
+                at = flat[seen][(sign * flat[seen, 0]).argmax()]
                 joints = "".join(f", joint {joint}" for joint in design.joints.get(f"end {end}", ()))
-                names.append((right, f"{design.name}, end {end}{joints}", _SHEET_COLOURS[index % 4]))
-    below = -math.inf
-    for at, name, colour in sorted(names, key=lambda item: float(item[0][1])):
-        below = max(below + 0.06 * view.size, float(at[1]))
-        place = view.high[0] + 0.04 * view.size, below
-        arrow = {"arrowstyle": "-", "color": colour, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate(name, at, place, color=colour, fontsize=9, va="center", arrowprops=arrow, annotation_clip=False)
+                names.append((at, where, f"{design.name}, end {end}{joints}", _SHEET_COLOURS[index % 4]))
+    halo = [withStroke(linewidth=3.0, foreground="white")]
+    for at, where, name, colour in sorted(names, key=lambda item: float(item[0][1])):
+        below[where] = max(below[where] + 0.06 * view.size, float(at[1]))
+        edge = view.high[0] + 0.04 * view.size if where == "right" else view.low[0] - 0.04 * view.size
+        text = {"color": colour, "fontsize": 9, "va": "center", "ha": "left" if where == "right" else "right"}
+        arrow = {"arrowstyle": "-", "color": INK_COLOUR, "lw": 0.8, "shrinkA": 0, "shrinkB": 0, "path_effects": halo}
+        axes.annotate(name, at, (edge, below[where]), arrowprops=arrow, annotation_clip=False, **text)
+        axes.plot(*at, "o", color=INK_COLOUR, markersize=3, path_effects=halo)
 
 
 def _draw_electrodes(axes: Any, design: SheetDesign, view: _View) -> None:
