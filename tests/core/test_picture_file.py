@@ -33,8 +33,7 @@ def test_a_file_that_cannot_be_is_refused_before_anything_is_drawn(what: str, tm
 
 
 def write(path: Path, savefig: Callable[..., None]) -> None:
-    figure: Any = SimpleNamespace(savefig=savefig)
-    write_picture(path, "the picture", lambda: figure, RecordingError)
+    write_picture(path, "the picture", lambda figure: setattr(figure, "savefig", savefig), RecordingError)
 
 
 def fail(exc: Exception) -> Callable[..., None]:

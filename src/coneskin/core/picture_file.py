@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .errors import ConeSkinError, needed_package
 from .files import explain_os_error
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _PICTURE_SUFFIXES = (".png", ".svg", ".pdf")
 #: of lines that no eye takes for each other (Okabe and Ito 2008)
@@ -40,14 +37,14 @@ def degree_ticks(axis: Any, span: float) -> None:
 
 
 def write_picture(
-    path: Path, what: str, compose: Callable[[], Figure], refusal: Callable[[str], ConeSkinError], dpi: int = 130
+    path: Path, what: str, compose: Callable[[Any], None], refusal: Callable[[str], ConeSkinError], dpi: int = 130
 ) -> None:
     """Draw a figure into a file, in the format of its suffix (png, svg, pdf).
 
     Args:
         path: of the file. That it can be written is looked at before anything is drawn.
         what: is drawn, such as "the picture of a run".
-        compose: makes the figure.
+        compose: draws on the figure that it is given, and gives it a size.
         refusal: makes the error of a text.
         dpi: dots per inch of a png.
 
@@ -63,12 +60,15 @@ def write_picture(
     with needed_package("matplotlib", "a picture", "pictures"):
         import matplotlib
         import numpy as np
+        from matplotlib.figure import Figure
     matplotlib.use("Agg", force=False)
     # a name may have dollars in it; an overflow would be a warning, and a picture of nothing
     failure = explain_os_error(refusal, f"{what} cannot be written to {path}", "; name another file")
     with failure, picture_style(), np.errstate(over="raise"):
         try:
-            compose().savefig(path, dpi=dpi)
+            figure = Figure(layout="constrained")
+            compose(figure)
+            figure.savefig(path, dpi=dpi)
         except ConeSkinError:
             raise
         except (ArithmeticError, ValueError) as exc:  # matplotlib's, for times or lengths of any size

@@ -15,8 +15,6 @@ from coneskin.core.picture_file import write_picture
 from .marks import place_sensors
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from coneskin.core.arrays import Floats
     from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
@@ -40,15 +38,13 @@ def draw_marks(scene: Scene, procedure: Procedure, q: Sequence[float] | None, pa
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-    draw, refuse = lambda: _compose(scene, procedure, q), lambda why: SceneError([why], scene.name)
+    draw, refuse = lambda figure: _compose(figure, scene, procedure, q), lambda why: SceneError([why], scene.name)
     write_picture(path, "the picture of the marks", draw, refuse, dpi=110)
 
 
-def _compose(scene: Scene, procedure: Procedure, q: Sequence[float] | None) -> Figure:
-    from matplotlib.figure import Figure
-
+def _compose(figure: Any, scene: Scene, procedure: Procedure, q: Sequence[float] | None) -> None:
     sensors = procedure.sensors
-    figure = Figure(figsize=(13.0, 5.4 * len(sensors)), layout="constrained")
+    figure.set_size_inches(13.0, 5.4 * len(sensors))
     grid = figure.add_gridspec(len(sensors), 2, width_ratios=(1.25, 1.0))
     number = 1
     for row, (item, placed) in enumerate(zip(sensors, place_sensors(scene), strict=True)):
@@ -56,7 +52,6 @@ def _compose(scene: Scene, procedure: Procedure, q: Sequence[float] | None) -> F
         if q is not None:
             _draw_arm(figure.add_subplot(grid[row, 1], projection="3d"), item, placed, q, number)
         number += len(item.plan)
-    return figure
 
 
 def _draw_sheet(axes: Any, item: SensorMarks, first: int) -> None:

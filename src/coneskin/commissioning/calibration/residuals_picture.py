@@ -13,8 +13,6 @@ from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from .calibrate import CalibrationResult
     from .fit import KnownTouch
 
@@ -30,17 +28,14 @@ def draw_residuals(results: Sequence[CalibrationResult], path: Path) -> None:
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-    draw, refuse = lambda: _compose(results), lambda why: SceneError([why], path.name)
+    draw, refuse = lambda figure: _compose(figure, results), lambda why: SceneError([why], path.name)
     write_picture(path, "the picture of the residuals", draw, refuse, dpi=110)
 
 
-def _compose(results: Sequence[CalibrationResult]) -> Figure:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.0, 5.6 * len(results)), layout="constrained")
+def _compose(figure: Any, results: Sequence[CalibrationResult]) -> None:
+    figure.set_size_inches(8.0, 5.6 * len(results))
     for number, result in enumerate(results, 1):
         _draw(figure.add_subplot(len(results), 1, number), result)
-    return figure
 
 
 def _draw(axes: Any, result: CalibrationResult) -> None:

@@ -16,8 +16,6 @@ from .speed_map import LEVERS, SpeedMap, contact_at
 from .taylor_integrator import integrate
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from coneskin.scene.values.scene import Scene
 
     from .limits_file import LimitsFile
@@ -33,15 +31,13 @@ def draw_map(scene: Scene, limits: LimitsFile, found: SpeedMap, path: Path) -> N
         MissingExtra: matplotlib is not installed.
         SceneError: the file cannot be written, or its suffix is another.
     """
-    draw, refuse = lambda: _compose(scene, limits, found), lambda why: SceneError([why], path.name)
+    draw, refuse = lambda figure: _compose(figure, scene, limits, found), lambda why: SceneError([why], path.name)
     write_picture(path, "the picture of the speeds", draw, refuse)
 
 
-def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
-    from matplotlib.figure import Figure
-
+def _compose(figure: Any, scene: Scene, limits: LimitsFile, found: SpeedMap) -> None:
     sheets = list(dict.fromkeys(patch.sensor for patch in found.patches))[:_MAX_SHEETS]
-    figure = Figure(figsize=(12.0, 3.4 * max(2, len(sheets))), layout="constrained")
+    figure.set_size_inches(12.0, 3.4 * max(2, len(sheets)))
     left, right = figure.subfigures(1, 2, squeeze=False)[0]
     highest = max(curve.speeds[_LEVER_INDEX] for curve in found.curves)
     rows = left.subplots(len(sheets), 1, squeeze=False)[:, 0]
@@ -53,7 +49,6 @@ def _compose(scene: Scene, limits: LimitsFile, found: SpeedMap) -> Figure:
     _draw_curves(curves, found)
     _draw_forces(forces, scene, limits, found)
     figure.suptitle(f"Permissible speeds by {limits.edition}; a model, no safety assessment", fontsize=10)
-    return figure
 
 
 def _draw_sheet(axes: Any, scene: Scene, found: SpeedMap, name: str, highest: float) -> Any:

@@ -16,8 +16,6 @@ from coneskin.scene.values.scene import Scene
 from .run import Run
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from coneskin.scene.build import SensorOnArm
 
 _EVENT_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
@@ -33,12 +31,10 @@ def draw_run(run: Run, path: Path) -> None:
         MissingExtra: matplotlib is not installed.
         RecordingError: the file cannot be written, or its suffix is another.
     """
-    write_picture(path, "the picture of a run", lambda: _compose(run), RecordingError)
+    write_picture(path, "the picture of a run", lambda figure: _compose(figure, run), RecordingError)
 
 
-def _compose(run: Run) -> Figure:
-    from matplotlib.figure import Figure
-
+def _compose(figure: Any, run: Run) -> None:
     scene = run.scene()
     states, slider = list(run.states()), list(run.slider())
     if len({fraction for _, fraction in slider}) < 2:
@@ -53,7 +49,7 @@ def _compose(run: Run) -> Figure:
     window = max(zero - 0.3, min(ends[0], zero)), min(_last(run.events, zero) + 0.2, max(ends[-1], zero + 0.1))
     stop = next((event for event in run.events if event.name == "stopping" and "contact" in event.details), None)
     contact = (stopping_contact(stop, run.events) if stop else _first(run.events, "contact_located", zero)) or contact
-    figure = Figure(figsize=(12.0, 7.6 if slider else 6.4), layout="constrained")
+    figure.set_size_inches(12.0, 7.6 if slider else 6.4)
     heights = (1.0, 0.4, 1.0) if slider else (1.0, 1.0)
     grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.5, 1.0), height_ratios=heights)
     _draw_speeds(figure.add_subplot(grid[0, 0]), states, run.events, zero, window, word)
@@ -72,7 +68,6 @@ def _compose(run: Run) -> Figure:
     if scene.arm is not None and states:
         axes = figure.add_subplot(grid[:, 1], projection="3d")
         _draw_arm(axes, scene, run.place_sensors(), states, contact, zero, word)
-    return figure
 
 
 def _vector(event: GuardEvent, key: str) -> tuple[float, float, float]:

@@ -9,14 +9,11 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import write_picture
 from coneskin.runs.export.tables import write_parquet
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 class VariantScore(NamedTuple):
@@ -114,17 +111,16 @@ def draw_variants(scores: Sequence[VariantScore], path: Path) -> None:
         MissingExtra: matplotlib is not installed.
         RecordingError: the suffix is another, or the file cannot be written.
     """
-    write_picture(path, "the picture of variants", lambda: _compose(scores), RecordingError)
+    write_picture(path, "the picture of variants", lambda figure: _compose(figure, scores), RecordingError)
 
 
-def _compose(scores: Sequence[VariantScore]) -> Figure:
-    from matplotlib.figure import Figure
+def _compose(figure: Any, scores: Sequence[VariantScore]) -> None:
     from matplotlib.lines import Line2D
 
     shared, names = _shared_settings([score.variant for score in scores])
     drawn = [score for score in scores if not math.isnan(score.delay_median_ms)]
     differ = len({_place(score) for score in drawn}) > 1  # one dot alone would say less than its numbers
-    figure = Figure(figsize=(8.0, (4.6 if differ else 0.6) + _LINE_HEIGHT * len(scores)), layout="constrained")
+    figure.set_size_inches(8.0, (4.6 if differ else 0.6) + _LINE_HEIGHT * len(scores))
     key = []
     for number, (score, name) in enumerate(zip(scores, names, strict=True), 1):
         seen = not math.isnan(score.delay_median_ms)
@@ -149,7 +145,6 @@ def _compose(scores: Sequence[VariantScore]) -> Figure:
     figure.suptitle(title, fontsize=9, x=0.02, ha="left", wrap=True)
     if differ:
         _draw_places(figure.add_subplot(), scores, time)
-    return figure
 
 
 def _duration_words(hours: float) -> str:
