@@ -16,8 +16,8 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 
-from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit, shorten_time_slice
+from coneskin.core.channel import Channel, encode_json, wait_readable
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.arm.inertia import held_braking
 from coneskin.robot.driver.liveness import BEAT_PERIOD, GUARD_SILENCE, UNGUARDED_TIME
@@ -123,11 +123,8 @@ def main(arguments: list[str]) -> int:
     """Run as ``python -m coneskin.robot.stop.guard_watchdog``: take the channels, wait for the settings, serve."""
     shorten_time_slice()
     lifeline, (guard, session) = inherit(arguments, parent=1)
-    while not (hello := session.receive()) and not session.closed:
-        wait_readable([session], 1.0)
-    if not hello:
+    if (settings := first_message(session)) is None:
         return 1
-    settings = decode_json(hello[0])
     limits = MonitoringLimits(**settings["monitoring"])
     host = settings["host"]
     try:

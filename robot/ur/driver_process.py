@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit, shorten_time_slice
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
@@ -341,11 +341,8 @@ def main(arguments: list[str]) -> int:
     """Run as ``python -m coneskin.robot.ur.driver_process``: take the channels, wait for the host, serve."""
     shorten_time_slice()
     lifeline, (guard, program) = inherit(arguments, parent=1)
-    while not (hello := program.receive()) and not program.closed:
-        wait_readable([program], 1.0)
-    if not hello:
+    if (settings := first_message(program)) is None:
         return 1
-    settings = decode_json(hello[0])
     try:
         with Deadman(guard, program) as deadman, UrArm(settings["host"], settings["watchdog_hz"]) as arm:
             driver = DriverProcess(

@@ -24,7 +24,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from .channel import Channel
+from .channel import Channel, decode_json, wait_readable
 from .errors import RobotConnectionError
 from .files import explain_os_error
 
@@ -178,6 +178,13 @@ def inherit(arguments: list[str], parent: int = 0) -> tuple[Lifeline, list[Chann
     count, *numbers = map(int, arguments)
     channels = [Channel(socket.socket(fileno=number)) for number in numbers[:count]]
     return Lifeline(channels[parent], numbers[count] if len(numbers) > count else None), channels
+
+
+def first_message(channel: Channel) -> dict[str, Any] | None:
+    """Wait for the settings that a parent sends first; None where it has ended, or ends the child, before."""
+    while not (hello := channel.receive()) and not channel.closed:
+        wait_readable([channel], 1.0)
+    return decode_json(hello[0]) if hello and hello[0] != b"quit" else None
 
 
 _MIN_SLICE = 100_000  # ns that Linux takes

@@ -8,8 +8,8 @@ import sys
 import time
 from pathlib import Path
 
-from coneskin.core.channel import decode_json, wait_readable, wait_writable
-from coneskin.core.child_process import inherit, shorten_time_slice
+from coneskin.core.channel import wait_writable
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.core.recording.block import encode_block
 
@@ -29,11 +29,8 @@ def main(arguments: list[str]) -> int:
     from .guard_run import run_guard
 
     session.overflow = RecordingOverflowFilter()
-    while not (hello := session.receive()) and not session.closed:
-        wait_readable([session], 1.0)
-    if not hello or hello[0] == b"quit":
+    if (start := first_message(session)) is None:
         return 1
-    start = decode_json(hello[0])
     with contextlib.suppress(OSError):
         os.nice(_NICE_VALUE)  # allowed for root, and where the user's limits say so
         if os.getsid(0) == os.getpid():  # Linux may first divide its time among sessions; this one is the guard's own

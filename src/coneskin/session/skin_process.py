@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit, shorten_time_slice
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 
 if TYPE_CHECKING:  # imported once the line to the program is there, which may have ended already
@@ -47,11 +47,8 @@ def main(arguments: list[str]) -> int:
     from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, play, wait_for_reader, write_all
 
     presses, truths = lines[:1], lines[1:]  # from the physics, and what it knows on to the program
-    while not (hello := channel.receive()) and not channel.closed:
-        wait_readable([channel], 1.0)
-    if not hello:
+    if (start := first_message(channel)) is None:
         return 1
-    start = decode_json(hello[0])
     scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
     master, slave, path = open_raw_terminal(awaited=True)
     os.close(slave)

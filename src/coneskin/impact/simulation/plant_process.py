@@ -16,8 +16,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import inherit, shorten_time_slice
+from coneskin.core.channel import Channel, encode_json, wait_readable
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError, MissingExtra
 from coneskin.core.text import finite
 
@@ -40,11 +40,8 @@ def main(arguments: list[str]) -> int:
     from .impact_outcome import ImpactMeter, TouchRecorder, TruthRecorder
     from .mujoco_plant import ScenePlant
 
-    while not (hello := program.receive()) and not program.closed:
-        wait_readable([program], _POLL_TIMEOUT)
-    if not hello:
+    if (start := first_message(program)) is None:
         return 1
-    start = decode_json(hello[0])
     try:
         scene = parse_scene(start["scene"], start["name"], Path(start["folder"]))
         plant = ScenePlant(scene, start["q"])
