@@ -100,6 +100,8 @@ def test_the_wheel_holds_every_module_and_nothing_else(wheel: Path) -> None:
             "*.c",
             "*.toml",
             "*.txt",
+            "*.css",
+            "*.js",
             "gallery/*.rec",
         )
         for path in folder.rglob(pattern)

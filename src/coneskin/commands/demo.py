@@ -43,41 +43,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session
 
-#: the scene of the demo: the tube of the UR5e's forearm as ``coneskin design`` finds it. The limits of
-#: silence are long because a pseudo-terminal on a busy machine can stall for that long
-_SCENE_TEXT = """\
-[arm]
-model = "UR5e"
-host = "{host}"
-control = "{control}"
-
-[[link]]
-name = "forearm"
-
-[[link.sensor]]
-id = 1
-name = "forearm skin"
-radius1_mm = 37.62
-radius2_mm = 37.30
-height_mm = 240
-xyz_mm = [0, -0.4, 100]
-
-[source]
-kind = "virtual"
-rate_hz = 200                 # as a board's firmware sends
-
-[reaction]
-kind = "{reaction}"
-deceleration_rad_s2 = 40      # this arm's motors can, folded as it is here: docs/safety.md
-distance_mm = 20              # and back what it moved while it stopped: the whole arm may go 100 mm
-bare_side = "fast"            # upper arm and wrists have no skin, and lead: nothing is there in this simulation
-
-[monitoring]                  # defaults: 50 ms each; a pseudo-terminal on a busy machine can stall for longer
-skin_silence_ms = 1000
-skin_late_ms = 1000
-arm_silence_ms = 1000
-program_silence_ms = 1000
-"""
 _TOUCHED_U = 0.13  #: m; slant distance of the touch from end 1
 _FROM_DEG = (-40.0, -90.0, 90.0, -90.0, -90.0, 0.0)  #: joint positions at the start
 _TO_DEG = (60.0, -80.0, 80.0, -90.0, -90.0, 0.0)  #: joint positions at the end
@@ -214,9 +179,11 @@ def run(args: argparse.Namespace) -> int:
     with explain_os_error(RobotRefused, f"cannot make the folder {folder}", "; name another with -o"):
         folder.mkdir(parents=True)
     host = free_host()
+    # the tube of the UR5e's forearm as ``coneskin design`` finds it
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     for control in ("internal", "external"):
-        text = _SCENE_TEXT.format(host=host, control=control, reaction=args.reaction)
-        scene = parse_scene(text, "scene.toml", folder)
+        scene_text = text.format(host=host, control=control, reaction=args.reaction)
+        scene = parse_scene(scene_text, "scene.toml", folder)
         if not missing_packages(scene)[0]:
             break
     (folder / "scene.toml").write_text(scene.text, encoding="utf-8")
