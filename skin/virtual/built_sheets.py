@@ -89,7 +89,7 @@ def draw_flaws(tolerance: SheetTolerance, seed: int) -> tuple[SheetFlaws, SheetF
     return one(), one()
 
 
-class _Sheet:
+class BuiltSheet:
     """One sheet with its two electrodes, x along its field; its size is from electrode to electrode, and across [m]."""
 
     def __init__(self, flaws: SheetFlaws, size: tuple[float, float], ohms: float) -> None:
@@ -174,8 +174,8 @@ class _Pair:
         self.length = math.log1p(self.curvature * cone.slant) / self.curvature if self.curvature else cone.slant
         self.breadth = cone.radius1 * cone.wrap
         self._wrap = cone.wrap
-        self._upper = _Sheet(flaws[0], (self.length, self.breadth), sensor.upper_sheet_ohms)
-        self._lower = _Sheet(flaws[1], (self.breadth, self.length), sensor.lower_sheet_ohms)
+        self._upper = BuiltSheet(flaws[0], (self.length, self.breadth), sensor.upper_sheet_ohms)
+        self._lower = BuiltSheet(flaws[1], (self.breadth, self.length), sensor.lower_sheet_ohms)
         self.bare: Floats = np.zeros((4, 4))
         self.bare[np.ix_((1, 0), (1, 0))] = self._upper.own
         self.bare[np.ix_((3, 2), (3, 2))] = self._lower.own

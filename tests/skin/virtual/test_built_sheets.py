@@ -12,7 +12,7 @@ import pytest
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, PlaceFloor, SheetTolerance
-from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, _Sheet, build_specimen, draw_flaws
+from coneskin.skin.virtual.built_sheets import BuiltSheet, BuiltSheets, SheetFlaws, build_specimen, draw_flaws
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from coneskin.skin.wire import FrameDecoder
@@ -60,7 +60,7 @@ def test_what_peels_off_narrows_the_way_of_the_current() -> None:
 
 def test_the_floor_holds_a_fifth_of_an_electrode_that_no_reading_shows_to_have_peeled_off() -> None:
     size, x = (0.24, 0.229), np.arange(49) / 48
-    off = size[0] * (_Sheet(SheetFlaws(peeled=0.2), size, 1000.0).answer[:2401, 1].reshape(49, 49) - x[:, None])
+    off = size[0] * (BuiltSheet(SheetFlaws(peeled=0.2), size, 1000.0).answer[:2401, 1].reshape(49, 49) - x[:, None])
     for tolerance, held in ((FILM_SHEETS, True), (replace(FILM_SHEETS, peel=0.0), False)):
         floor = PlaceFloor(tolerance, size, (1048.0, 954.0))
         variances = np.array([[floor.at(a, b, 0.0, 0.0)[0] for b in x] for a in x])
@@ -87,7 +87,7 @@ def test_the_field_of_a_sheet_is_that_of_ngsolve(slope: float, across: float, sk
     rest = (-form.mat * field.vec).Evaluate()
     field.vec.data += form.mat.Inverse(space.FreeDofs()) * rest
     energy = ngsolve.Integrate(tensor * ngsolve.grad(field) * ngsolve.grad(field), mesh)
-    own = _Sheet(SheetFlaws(slope, across, 0.0, skew, stretch), (length, breadth), 1000.0)
+    own = BuiltSheet(SheetFlaws(slope, across, 0.0, skew, stretch), (length, breadth), 1000.0)
     assert own.own[0, 0] == pytest.approx(energy, rel=1e-3)  # the bond of an electrode is 5 mohm of a kilohm
     for i, j in ((12, 12), (24, 40), (40, 6)):
         seen = own.answer[i * 49 + j, 0]
