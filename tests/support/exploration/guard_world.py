@@ -271,15 +271,17 @@ class GuardWorld:
         core, judge = self.core, self._judge
         arm, activation, moves = core._arm, core._activation, self.settings.reaction not in ("stop", "slow")
         assert arm is not None
+        stopping = core.phase.stopping  # then what only stands against a reset decides nothing yet
         facts: list[object] = [core.phase, self.arm.speed > 0.01, self.arm.safety_bits, self.wrong.key()]
         facts += [
-            bool(core._faults) and not (core.phase.stopping or core.phase is Phase.LATCHED),  # what a reset forgives
+            bool(core._faults) and not (stopping or core.phase is Phase.LATCHED),  # a reset forgives them
             activation.resetting,
             activation._way.released_at is None,
             judge.waiting < math.inf,
         ]
-        facts += [(detector.ready, detector.touched) for detector in core._stream.detectors]
-        facts += [tuple(core._companions._silent), bool(arm.state_age.trouble(self.now)), arm.backup_ready]
+        facts += [(detector.ready and not stopping, detector.touched) for detector in core._stream.detectors]
+        trouble = bool(arm.state_age.trouble(self.now)) and not stopping
+        facts += [tuple(core._companions._silent), trouble, arm.backup_ready]
         stop, slow = arm._stop, arm.speed_reduction
         facts += [slow.now is None, slow._halted_from is None, slow.halted and self.arm.runtime_state == 2]
         if core.phase not in _RESTING:
@@ -383,11 +385,12 @@ class GuardWorld:
 
     def _patience(self) -> int:
         """Return the cycles in which something has to change by itself."""
-        arm = self.core._arm
+        arm, resting = self.core._arm, self.core.phase in _RESTING
         assert arm is not None
-        if self._judge.waiting < math.inf or (arm.state_age.trouble(self.now) and not self.wrong.states):
+        late = resting and arm.state_age.trouble(self.now) and not self.wrong.states
+        if self._judge.waiting < math.inf or late:
             return _CLOCK_CYCLES
-        return _LONG if self.core.phase in _RESTING else _VERY_LONG
+        return _LONG if resting else _VERY_LONG
 
     def _break(self, name: str, what: str) -> None:
         assert name in INVARIANTS, name
