@@ -46,17 +46,22 @@ def explore_one(settings: Settings) -> Exploration:
 
 
 def explore_guard(wrong: int, parallel: int) -> bool:
-    rows, whole = [], True
-    cases = [Settings(reaction, control, most_wrong=wrong) for control in CONTROLS for reaction in REACTIONS]
+    whole, things = True, "one thing" if wrong == 1 else f"{wrong} things"
     with ProcessPoolExecutor(parallel) as pool:
-        for settings, found in zip(cases, pool.map(explore_one, cases), strict=True):
-            rows.append(row(f"{settings.reaction}, {settings.control}", found, len(INVARIANTS)))
-            print(*rows[-1], file=sys.stderr)
-            whole = whole and found.closed and not found.broken
-            for way, said in found.broken.values():
+        found = {
+            control: [
+                (reaction, pool.submit(explore_one, Settings(reaction, control, most_wrong=wrong)))
+                for reaction in REACTIONS
+            ]
+            for control in CONTROLS
+        }
+        for control, cases in found.items():
+            done = [(reaction, case.result()) for reaction, case in cases]
+            rows = [row(reaction, each, len(INVARIANTS)) for reaction, each in done]
+            for way, said in (broken for _, each in done for broken in each.broken.values()):
                 print(f"{said}\n  after: {', '.join(way)}")
-    things = "one thing" if wrong == 1 else f"{wrong} things"
-    show(f"The guard's core, {things} wrong at once", ["reaction and control", *COLUMNS], rows)
+            whole = whole and all(each.closed and not each.broken for _, each in done)
+            show(f"The guard's core, {control} control, {things} wrong at once", ["reaction", *COLUMNS], rows)
     return whole
 
 
