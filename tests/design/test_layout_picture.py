@@ -49,7 +49,7 @@ def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str,
     assert len(last) == 4
     (led,) = [line for line in axes.lines if line.get_linewidth() == 2.5]
     start = led.get_xdata()[0], led.get_ydata()[0]
-    ends = [end for end in last if math.dist(end, start) < 12.0]
+    ends = [end for end in last if math.dist(end, start) < 0.1]
     crossing = sum(text.get_text()[1:3] == ", " for text in axes.texts)
     assert len(ends) + crossing == 4
     assert crossing == (wrap_deg > 200.0)

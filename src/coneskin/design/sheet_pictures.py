@@ -16,7 +16,7 @@ from coneskin.geometry.frustum import Frustum, unroll
 
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import polar_text
-from .workshop.build_figures import WIRE_COLOURS, SheetWire
+from .workshop.build_figures import WIRE_COLOURS, SheetWire, side_name
 
 INK_COLOUR = "#222222"
 FOIL_COLOUR = "#c27c0e"
@@ -69,29 +69,35 @@ def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) ->
     if layout.holes:  # the legend would show an area as a rectangle
         label = f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
         axes.plot([], [], "o", mfc="white", mec=INK_COLOUR, mew=0.8, label=label)
-    _draw_cable(axes, design, cone, wires)
-    _dimensions(axes, design, cone)
+    led = _draw_cable(axes, design, cone, wires)
+    _dimensions(axes, design, cone, [y for _, y in led])
     axes.margins(0.08)
     axes.set_aspect("equal")
     axes.axis("off")
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
 
 
-def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[SheetWire]) -> None:
-    """Draw the wires as they would lie if the link were flat too, on the side of the seam where the cable is."""
+def _draw_cable(
+    axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[SheetWire]
+) -> Sequence[tuple[float, float]]:
+    """Draw the wires as they would lie if the link were flat too, on the side of the seam where the cable is.
+
+    Returns:
+        the way of the cable on the drawing [mm], from where the wires meet.
+    """
     way = design.way
     ends = way.side.startswith("end")
     off = {"end1": (-1.0, 0.0), "end2": (1.0, 0.0), "edge0": (0.0, -1.0), "edge1": (0.0, 1.0)}[way.side]
     tab = 0.5 * design.layout.plan.tab
     turned = math.tau * round((float(way.surface[0, 1]) - 0.5 * cone.wrap) / math.tau)
 
-    exit_phi = float(way.surface[0, 1]) - turned
-    across = []
+    exit_u, exit_phi = float(way.surface[0, 0]), float(way.surface[0, 1]) - turned
+    across, target = [], (exit_u, exit_phi)
     for wire in wires:
         colour = WIRE_COLOURS[wire.electrode]
         style = {"color": "#d4a800" if colour == "yellow" else colour, "lw": 1.2}
         beyond = wire.u + off[0] * tab, wire.phi + off[1] * tab / max(cone.radius_at(wire.u), 1e-3)
-        target = (beyond[0], exit_phi) if ends else (float(way.surface[0, 0]), beyond[1])
+        target = (beyond[0], exit_phi) if ends else (exit_u, beyond[1])
         if ends and abs(target[1] - wire.phi) > math.pi:  # the shorter way goes across the seam, or around the link
             edge = cone.wrap if wire.phi > target[1] else 0.0
             axes.plot(
@@ -103,29 +109,32 @@ def _draw_cable(axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[S
         axes.plot(*zip(_at(cone, wire.u, wire.phi), *run, strict=True), **style)
     if across:  # beside each other there is no room for a word each
         names = ", ".join(wire.electrode for wire in across)
-        word = "across\nthe seam" if design.has_seam else "around\nthe link"
+        word = "across\nthe seam" if design.has_seam else f"around the bare link\nin line with {side_name(way.side)}"
         x, y = _at(cone, across[0].u + 3.5 * off[0] * tab, sum(wire.phi for wire in across) / len(across))
         axes.text(x, y, f"{names}, {word}", fontsize=7, ha="center", va="center")
-    led = [_at(cone, float(u), float(phi) - turned) for u, phi in way.surface]
+    led = [_at(cone, *target), *(_at(cone, float(u), float(phi) - turned) for u, phi in way.surface)]
     axes.plot(*zip(*led, strict=True), color=INK_COLOUR, lw=2.5)
     for index, marker, word, length in (
-        (way.tie, "s", "cable tie", way.tie_length),
+        (way.tie + 1, "s", "cable tie", way.tie_length),
         (-1, "D", "connector", way.connector_length),
     ):
         label = f"{word}, {1e3 * length:.0f} mm from the rim"
         axes.plot(*zip(led[index], strict=True), marker, color=INK_COLOUR, ms=6, ls="", label=label)
+    return led
 
 
-def _dimensions(axes: Any, design: SheetDesign, cone: Frustum) -> None:
-    """Draw the dimensions of the flat pattern and the names of the electrodes."""
+def _dimensions(axes: Any, design: SheetDesign, cone: Frustum, led: Sequence[float]) -> None:
+    """Draw the dimensions of the flat pattern, clear of heights [mm] of its cable, and the names of the electrodes."""
     wrap, slant, layout = cone.wrap, cone.slant, design.layout
     lift = 0.06 * max(slant, 0.3 * wrap * max(cone.radius1, cone.radius2))
     style = {"ha": "center", "va": "center", "fontsize": 9, "color": INK_COLOUR}
 
     x0, y0, x1, y1 = draw_shape(cone, layout.rim).bounds
     far = 1.5e3 * lift
-    wires = 1e3 * design.options.connector if layout.plan.wires == "end1" else 0.0
-    bottom, right = y0 * 1e3 - far - wires, x1 * 1e3 + far
+    tabs = 2e3 * design.layout.plan.tab
+    low = y0 * 1e3 - tabs if layout.plan.wires == "end1" else y0 * 1e3
+    high = y1 * 1e3 + tabs if layout.plan.wires == "end2" else y1 * 1e3
+    bottom, right = min(low, *led) - far, x1 * 1e3 + far
     arrow = {"arrowstyle": "<->", "color": INK_COLOUR, "lw": 0.7, "shrinkA": 0, "shrinkB": 0}
     axes.plot(
         [x0 * 1e3, x1 * 1e3, right], [bottom - 0.6e3 * lift, bottom, bottom], lw=0.0
@@ -142,8 +151,7 @@ def _dimensions(axes: Any, design: SheetDesign, cone: Frustum) -> None:
         polar_text(flat),
         f"active area {1e4 * layout.active.area(layout.sheet):.1f} cm2 ({layout.active_share:.0%})",
     ]
-    tabs = design.options.connector if layout.plan.wires == "end2" else 0.0
-    axes.text(500.0 * (x0 + x1), 1e3 * (y1 + tabs) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
+    axes.text(500.0 * (x0 + x1), max(high, *led) + 4.0, "\n".join(lines), **{**style, "va": "bottom"})
     for name in "ABCD":
         axes.text(
             *_at(cone, *layout.electrode_middle(name, 0.5 * slant, 0.42 * wrap)), name, **style, fontweight="bold"

@@ -264,6 +264,26 @@ def test_a_cable_lies_where_the_link_goes_on(low: float, high: float, end: str) 
     assert low < design.way.points[:, 2].min() < design.way.points[:, 2].max() < high
 
 
+def test_wires_of_an_end_near_the_rim_stay_on_the_link_and_one_goes_around_its_bare_side() -> None:
+    mesh = ending_at(-0.0042, 0.0742)
+    place = PlacedFrustum(Frustum(0.05, 0.05, 0.07, math.radians(200)))
+    (design,) = design_sheets([place], DesignOptions(wires="end1"), mesh=mesh)
+    text = guide(design, measure_build(design, 0, "mesh", mesh))
+    (row,) = [line for line in text.splitlines() if line.startswith("| tabs |")]
+    assert "only 4.2 mm of the link lie beyond its line" in row
+    assert row.endswith("led around the bare side of the link, taped to it in line with end 1: the wire of C |")
+
+
+@pytest.mark.parametrize(
+    ("u", "said"), [(-0.004, "4.0 mm beyond end 1"), (0.006, "6.0 mm inwards of the line of end 1")]
+)
+def test_a_cable_that_leaves_beside_an_end_is_measured_without_a_sign(u: float, said: str) -> None:
+    place = PlacedFrustum(Frustum(0.05, 0.05, 0.07, math.radians(200)))
+    (design,) = design_sheets([place], DesignOptions(wires="edge0"))
+    moved = replace(design, way=replace(design.way, u=u))
+    assert f"| cable | from edge 0, {said}; the tie" in guide(moved, measure_build(design, 0))
+
+
 def test_a_link_without_room_at_either_end_carries_its_cable_on_what_is_bolted_to_it() -> None:
     mesh = ending_at(-0.001, 0.062)
     (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.06))], DesignOptions(), mesh=mesh)

@@ -287,8 +287,14 @@ def _in_ohms(ohms: float) -> str:
 def _way_text(design: SheetDesign) -> str:
     """Return where the cable leaves a sheet, and where its tie and its connector lie, as a ruler finds them."""
     way, side = design.way, design.place.frustum
+
+    def beyond(u: float) -> str:
+        """Return where a place lies along the sheet, from the end nearer to it."""
+        end, off = ("end 1", -u) if u < 0.5 * side.slant else ("end 2", u - side.slant)
+        return f"{in_mm(off)} beyond {end}" if off >= 0.0 else f"{in_mm(-off)} inwards of the line of {end}"
+
     if way.side.startswith("edge"):
-        where = f"{in_mm(way.u)} from end 1"
+        where = beyond(way.u)
     else:
         arc, around = way.phi * side.radius_at(way.u), 2.0 * math.pi * side.radius_at(way.u)
         back = arc > 0.5 * around
@@ -297,12 +303,9 @@ def _way_text(design: SheetDesign) -> str:
     parts = [f"from {side_name(way.side)}, {where}"]
     for what, index, length in (("tie", way.tie, way.tie_length), ("connector", -1, way.connector_length)):
         u, phi = way.surface[index]
-        end = "end 1" if abs(u) < abs(u - side.slant) else "end 2"
-        off = -u if end == "end 1" else u - side.slant
         turn = math.remainder(phi - way.phi, 2.0 * math.pi) * side.radius_at(min(max(u, 0.0), side.slant))
-        beyond = f"{in_mm(off)} beyond {end}" if off >= 0.0 else f"{in_mm(-off)} inwards of the line of {end}"
         aside = f", {in_mm(abs(turn))} {'on' if turn > 0.0 else 'back'} around" if abs(turn) > 2e-3 else ""
-        parts.append(f"the {what} lies {beyond}{aside}, {in_mm(length)} along the cable")
+        parts.append(f"the {what} lies {beyond(u)}{aside}, {in_mm(length)} along the cable")
     if way.on_sheet:
         parts.append("all of it on part 7, over the seam, where no touch is located")
     if way.hangs:
@@ -314,14 +317,29 @@ def _way_text(design: SheetDesign) -> str:
     return "; ".join(parts)
 
 
-def _tabs_text(design: SheetDesign) -> str:
-    """Return where the tabs of a sheet lie."""
+def _tabs_text(design: SheetDesign, figures: BuildFigures) -> str:
+    """Return where the tabs of a sheet lie, and its wires beside them."""
     side, slope = design.layout.plan.wires, design.apron.slope
     if design.way.on_sheet:
         return f"{side_name(side)}: they stand up between the two edges of the seam; lay their wires on part 7 along it"
     where = f"over {side_name(side)}"
     if side.startswith("edge"):
         where += "; lead the wires out on the bare link beside that edge"
+    else:
+        rim = figures.placement.before if side == "end1" else figures.placement.beyond
+        if rim is not None and rim < design.layout.plan.tab and not design.way.hangs:
+            where += (
+                f"; only {in_mm(max(rim, 0.0))} of the link lie beyond its line: fold the tabs up as soon as their "
+                "wires are on, and lay no wire beyond the rim of the link"
+            )
+        bare = 0.5 * (design.place.frustum.wrap + math.tau)  # middle of the side without a sheet
+        at = (design.way.phi - bare) % math.tau
+        around = [w.electrode for w in figures.wires if abs((w.phi - bare) % math.tau - at) > math.pi]
+        if around and not design.has_seam:
+            where += (
+                f"; led around the bare side of the link, taped to it in line with {side_name(side)}: the wire of "
+                f"{' and of '.join(around)}"
+            )
     if slope:
         rise = math.degrees(math.atan(slope))
         where += f"; the link stands out there: bend the tabs up by {rise:.0f} deg, so that none lies on it"
@@ -342,7 +360,7 @@ def _own_rows(design: SheetDesign, figures: BuildFigures, folder: str, number: i
         "part 1",
         f"{in_mm(one.slant)} from end 1 to end 2 along an edge, {chord} straight between the corners of end 1",
     )
-    yield "tabs", _tabs_text(design)
+    yield "tabs", _tabs_text(design, figures)
     yield "lead", f"of {plan.led_across}"
     for pair in figures.pairs:
         yield pair.pair, f"{_in_ohms(pair.ohms)} for {pair.sheet_ohms:g} ohm per square"
