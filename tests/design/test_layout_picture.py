@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from coneskin.design.sheet_pictures import draw_layout
+from coneskin.design.sheet_pictures import draw_layout, draw_parts, draw_seam
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.workshop.build_figures import _sheet_wires
 from coneskin.geometry.frustum import Frustum
@@ -68,3 +68,17 @@ def test_a_cable_that_passes_edge_0_is_drawn_as_one_line() -> None:
     places = list(zip(led.get_xdata(), led.get_ydata(), strict=True))
     assert design.way.surface[-1, 1] > math.tau
     assert max(math.dist(one, two) for one, two in itertools.pairwise(places)) < 7.0
+
+
+def test_the_section_names_the_edges_at_the_edges_and_only_a_sheet_with_a_flap_speaks_of_one() -> None:
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    (design,) = design_sheets((PlacedFrustum(Frustum(0.05, 0.05, 0.1, math.radians(200.0))),), DesignOptions())
+    section, parts = module.Figure(), module.Figure()
+    draw_seam(section, design)
+    (axes,) = section.axes
+    named = {text.get_text().strip(): text for text in axes.texts}
+    assert named["edge 0"].get_position()[0] == 0.0
+    bare = named[next(name for name in named if name.endswith("mm bare"))].get_position()[0]
+    assert named["edge of C"].get_position()[0] == pytest.approx(2.0 * bare), "the bare link is between the edges"
+    draw_parts(parts, design)
+    assert "flap" not in "".join(text.get_text() for axes in parts.axes for text in axes.texts)

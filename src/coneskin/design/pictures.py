@@ -84,7 +84,9 @@ def draw_pictures(
         progress(f"{design.name}: drawing the layout")
         caption = f"{title}, flat, seen from outside, and the way of its wires; dimensions in mm."
         x0, y0, x1, y1 = design.cuts[4].bounds
-        picture(f"{name}-layout", (9, min(7.0, 3.5 + 9.0 * (y1 - y0) / (x1 - x0))), caption, draw_layout, design, item.wires)
+        picture(
+            f"{name}-layout", (9, min(7.0, 3.5 + 9.0 * (y1 - y0) / (x1 - x0))), caption, draw_layout, design, item.wires
+        )
         progress(f"{design.name}: drawing how it is built")
         caption = f"{title}: its seven parts in the order of assembly, each seen from outside."
         picture(f"{name}-stack", (9, 7), caption, draw_stack, design)

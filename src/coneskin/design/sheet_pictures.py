@@ -189,7 +189,9 @@ def draw_parts(figure: Any, design: SheetDesign) -> None:
         title += f"slant {1e3 * flat.slant:.1f} mm, arcs {1e3 * flat.arc1:.1f} mm (end 1), {1e3 * flat.arc2:.1f} mm"
         axes.set_title(title, fontsize=8)
         axes.set_aspect("equal")
-    words = "sizes with tabs and flap\nred cut, magenta hole, blue mark, green fold"
+    words = (
+        f"sizes with tabs{' and flap' if design.options.overlap else ''}\nred cut, magenta hole, blue mark, green fold"
+    )
     grid.flat[7].text(0.5, 0.5, words, ha="center", fontsize=9, transform=grid.flat[7].transAxes)
 
 
@@ -238,7 +240,8 @@ def draw_seam(figure: Any, design: SheetDesign) -> None:
         low, beside = (heights[2], 0.5 * heights[1]) if name in "CD" else (heights[3] - foil, 0.5 * sum(heights[4:]))
         for x in fill(shape, low, low + foil, FOIL_COLOUR):
             text = name if name in "CD" else f"lead of {name}"
-            axes.text(x, beside, text, ha="center", va="center", fontweight="bold")
+            style = {"ha": "center", "va": "center", "fontweight": "bold", "arrowprops": {"arrowstyle": "-", "lw": 0.7}}
+            axes.annotate(text, (x, low + 0.5 * foil), (x, beside), **style)
     top, red = 1.15 * heights[5], "#b00020"
     axes.plot([0.0], [1.2 * top], lw=0)  # arrows and text do not extend the axes
     arrow = {"arrowstyle": "<->", "color": red, "shrinkA": 0, "shrinkB": 0}
@@ -246,8 +249,9 @@ def draw_seam(figure: Any, design: SheetDesign) -> None:
     blind = sum(edges) + bare
     text = f"no touch is located here: {blind:.1f} mm, {math.degrees(blind / arc):.1f} deg"
     axes.text(0.5 * (edges[0] - edges[1] - gap), 1.05 * top, text, ha="center", fontsize=9, color=red)
-    for x, text in ((0.6 * reach, "edge 0"), (-0.6 * reach - gap, "edge of C")):
-        axes.text(x, -0.13 * reach, text, ha="center", va="top", fontsize=9)
+    for x, text, side in ((0.0, " edge 0", "left"), (-gap, "edge of C ", "right")):
+        axes.plot([x, x], [-0.19 * reach, heights[5]], color=INK_COLOUR, lw=0.8)
+        axes.text(x, -0.13 * reach, text, ha=side, va="top", fontsize=9)
     if bare > gap:
         axes.text(
             -0.5 * gap, 0.5 * heights[5], f"{bare:.0f} mm bare", rotation=90, ha="center", va="center", fontsize=8

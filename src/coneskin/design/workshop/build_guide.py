@@ -139,6 +139,11 @@ def _wrap_steps(designs: Sequence[SheetDesign], collars: bool) -> Iterator[str]:
         if holes
         else ""
     )
+    if not all(design.layout.holes for design in designs):
+        pins += (
+            " Nothing but your eye stops a mirrored part of a sheet without *pins*: lay each part dry on the one "
+            "before it. *Check:* sides of one name lie over each other, and it wears the face up that its letters say."
+        )
     seen = "anticlockwise as seen when you look from end 2 towards end 1"
     strips = f"strips of {TAPE} 3 mm wide on both of its faces, along its rim and outside the foils only"
     isolation = (
