@@ -19,11 +19,6 @@ _COMPLETION_VARIABLE = "_ARGCOMPLETE"  # set by the code of the shell
 _LINE_VARIABLE = "COMP_LINE"  # what was typed so far
 
 
-def _completed_words() -> Sequence[str] | None:
-    """Return the words typed so far after the program's name, where a shell asks for a completion; else None."""
-    return os.environ.get(_LINE_VARIABLE, "").split()[1:] if _COMPLETION_VARIABLE in os.environ else None
-
-
 def _complete(parser: argparse.ArgumentParser) -> None:
     """Answer the shell and end the process; return where argcomplete is not installed."""
     try:
@@ -95,7 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    completing = _completed_words()
+    # the words typed so far after the program's name, where a shell asks for a completion
+    completing = os.environ.get(_LINE_VARIABLE, "").split()[1:] if _COMPLETION_VARIABLE in os.environ else None
     words = list(completing if completing is not None else sys.argv[1:] if arguments is None else arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):  # the name of a file may be no text: it is written out, as on stderr
         sys.stdout.reconfigure(errors="backslashreplace")

@@ -21,14 +21,13 @@ from typing import Any
 from urllib.parse import urlsplit
 from xml.parsers.expat import ExpatError
 
-from coneskin.robot.sim.urscript.value_functions import text_of
+from coneskin.robot.sim.urscript.value_functions import MAX_LINE, text_of
 from coneskin.robot.sim.urscript.values import Array, PoseValue, ScriptError, Struct, make_list, number, show
 
 from .script_host import CallingProgram, ScriptHost, ScriptSocket
 
 _MAX_SOCKETS = 32  # of one program, at once; an assumption
 _MAX_VALUES = 30  # of one read
-MAX_LINE = 1023  #: characters that socket_read_line and socket_read_string return
 CONNECT_TIMEOUT = 2.0  #: s; an assumption
 _SOCKET_NAME = "socket_0"  # of a connection that the program does not name
 _NUMBER_LIST = re.compile(rb"[^(]*\(([^()]*)\)")

@@ -162,7 +162,7 @@ for _name, _function in _EXPRESSIONS.items():
     setattr(ValueFunctions, _name, staticmethod(named(_name, _function)))
 
 
-MAX_LINE = 1023  #: characters that str_cat and to_str make
+MAX_LINE = 1023  #: characters that str_cat, to_str and a read of a socket make
 _NUMBER_TEXT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 

@@ -181,11 +181,11 @@ def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
 def test_the_bill_counts_every_sheet() -> None:
     designs = design_sheets(double_cone(0.04, 0.07, 0.04, 0.15, 0.15), DesignOptions(plan=ElectrodePlan()))
     figures = [measure_build(design, index) for index, design in enumerate(designs)]
-    bill = {item.item: item.quantity for item in bill_of_materials(designs, figures)}
+    bill = {item: quantity for item, quantity, _ in bill_of_materials(designs, figures)}
     assert bill["4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts"] == "2"
     assert bill["plastic pin with flat head, 2.4 x 8 mm"] == "6"
     chosen, figure = built(CONE)  # with holes of another width
-    pins = {item.item: item.quantity for item in bill_of_materials([*designs, chosen], [*figures, figure])}
+    pins = {item: quantity for item, quantity, _ in bill_of_materials([*designs, chosen], [*figures, figure])}
     assert (pins["plastic pin with flat head, 2.4 x 8 mm"], pins["plastic pin with flat head, 1.9 x 8 mm"]) == (
         "6",
         "3",
@@ -323,17 +323,17 @@ def test_wires_at_an_edge_of_a_full_wrap_stand_up_from_the_seam_and_lie_over_it(
 def test_the_bill_has_what_the_steps_use_up() -> None:
     (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.2))], DesignOptions())
     figures = measure_build(design, 0, "mesh", ending_at(-0.1, 0.3))
-    items = {item.item: item for item in bill_of_materials([design], [figures])}
+    items = {item: quantity for item, quantity, _ in bill_of_materials([design], [figures])}
     plastic = sum(part.surface.volume for collar in figures.collars for part in collar.parts)
-    assert items["PLA or PETG, for a 3D printer"].quantity.startswith(f"{1e6 * plastic:.0f} cm3")
-    strap = items["hook-and-loop tape 15 to 20 mm wide"].quantity
+    assert items["PLA or PETG, for a 3D printer"].startswith(f"{1e6 * plastic:.0f} cm3")
+    strap = items["hook-and-loop tape 15 to 20 mm wide"]
     assert strap.startswith("2 pieces of ")
     assert float(strap.split()[-2]) > 2e3 * math.pi * 0.05
     sheet = next(item for name, item in items.items() if name.startswith("conductive sheet"))
-    assert "a strip of 20 x 120 mm to measure" in sheet.quantity, "step 2 measures a strip of it"
+    assert "a strip of 20 x 120 mm to measure" in sheet, "step 2 measures a strip of it"
     faces = sum(part.area for cut in design.cuts if cut.number in (1, 3, 5) for part in cut.parts)
     rims = 2.0 * (2.0 * 0.2 + 2.0 * math.pi * (0.05 + 0.05))  # m, around part 4, on both its faces
-    (tape,) = (item.quantity for name, item in items.items() if name.startswith("double-sided silicone adhesive"))
+    (tape,) = (item for name, item in items.items() if name.startswith("double-sided silicone adhesive"))
     assert tape == f"{1e4 * 1.15 * (faces + 0.003 * rims):.0f} cm2", "strips of 3 mm, and 15 % for offcuts"
     text = guide(design, figures)
     assert "hook-and-loop tape" in text

@@ -330,18 +330,10 @@ _STRAP_LAP = 80e-3  # m; of a strap: it passes over the collar, and holds on its
 _INSULATION_WIDTH = 10e-3  # m; width of the tape over leads and electrodes
 
 
-class _BillItem(NamedTuple):
-    """One line of the bill."""
-
-    item: str
-    quantity: str
-    used_for: str
-
-
 def bill_of_materials(
     designs: Sequence[SheetDesign], figures: Sequence[BuildFigures], beds: Sequence[MaterialBed] = ()
-) -> list[_BillItem]:
-    """List everything that the sheets of a design need, beside the electronics.
+) -> list[tuple[str, str, str]]:
+    """List everything that the sheets of a design need, beside the electronics: item, quantity, what it is for.
 
     Args:
         designs: the sheets.
@@ -356,7 +348,7 @@ def bill_of_materials(
             parts[cut.material].append(f"{design.name} part {cut.number}")
     strip = " and a strip of 20 x 120 mm to measure"  # in step 2; it is not built in
     items = [
-        _BillItem(
+        (
             material if "foil" not in material else f"{material}, 0.05 mm, with electrically conductive adhesive",
             f"{1e4 * net[material]:.0f} cm2 net{strip if material.startswith('conductive sheet') else ''}; "
             + ("; ".join(_blank(bed) for bed in beds if bed.material == material) or "larger than the bed"),
@@ -378,49 +370,47 @@ def bill_of_materials(
         size = f"{design.layout.plan.hole * 1e3 - 0.1:.1f} x {design.options.stack.thickness * 1e3 + 2.0:.0f} mm"
         pins[size] += len(design.layout.holes)
     items += [
-        _BillItem(
+        (
             f"double-sided silicone adhesive tape {ADHESIVE * 1e3:g} mm, without carrier",
             f"{1e4 * _OFFCUT_FACTOR * (faces + strips):.0f} cm2",
             "link to part 1, part 1 to 3, part 5 to 7, margins of part 4",
         ),
-        _BillItem(
+        (
             f"polyimide tape 0.03 mm, {_INSULATION_WIDTH * 1e3:g} mm wide",
             f"{math.ceil(10.0 * covered) / 10.0:.1f} m",
             "over leads and electrodes",
         ),
         *(
-            _BillItem(
+            (
                 f"stranded wire 0.14 mm2, {colour}",
                 f"{1e3 * sum(wire.length for wire in wires if wire.electrode == name):.0f} mm",
                 f"electrode {name}: " + ", ".join(f"{1e3 * w.length:.0f} mm" for w in wires if w.electrode == name),
             )
             for name, colour in WIRE_COLOURS.items()
         ),
-        _BillItem("4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts", f"{count}", "cable"),
-        _BillItem("copper tape with electrically conductive adhesive, 6 x 12 mm", f"{4 * count}", "wire to tab"),
-        _BillItem("heat-shrink tube 6 mm, 20 mm long", f"{4 * count}", "over the joint of wire and tab"),
-        _BillItem("self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm", f"{count}", "strain relief"),
+        ("4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts", f"{count}", "cable"),
+        ("copper tape with electrically conductive adhesive, 6 x 12 mm", f"{4 * count}", "wire to tab"),
+        ("heat-shrink tube 6 mm, 20 mm long", f"{4 * count}", "over the joint of wire and tab"),
+        ("self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm", f"{count}", "strain relief"),
     ]
     items += [
-        _BillItem("isopropanol, and a cloth that leaves no lint", "20 ml", "link, before the first layer"),
-        _BillItem(
-            "masking tape 19 mm wide", f"{math.ceil(2e3 * _MASKING_LENGTH * count) / 1e3:.0f} m", "while adhesives set"
-        ),
+        ("isopropanol, and a cloth that leaves no lint", "20 ml", "link, before the first layer"),
+        ("masking tape 19 mm wide", f"{math.ceil(2e3 * _MASKING_LENGTH * count) / 1e3:.0f} m", "while adhesives set"),
     ]
     collars = [collar for item in figures for collar in item.collars]
     if collars:
         plastic = sum(part.surface.volume for collar in collars for part in collar.parts)
         around = 2.0 * math.pi * max(design.place.frustum.radius1 for design in designs) + _STRAP_LAP
         items += [
-            _BillItem("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
-            _BillItem(
+            ("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
+            (
                 "hook-and-loop tape 15 to 20 mm wide",
                 f"{len(collars)} pieces of {10.0 * math.ceil(1e2 * around):.0f} mm",
                 "around the collars",
             ),
         ]
     return items + [
-        _BillItem(f"plastic pin with flat head, {size}", f"{number}", "registration holes")
+        (f"plastic pin with flat head, {size}", f"{number}", "registration holes")
         for size, number in pins.items()
         if number
     ]
