@@ -93,6 +93,7 @@ BENCHES = {
     "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
     "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
     "design-copies": Bench("bench.design.copies", "Links of which a part is missing."),
+    "design-room": Bench("bench.design.room", "Axes that the search never looks at."),
     "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),
     "design-assembly": Bench(
         "bench.design.assembly", "Whether a person would build each sheet; poses in which an arm folds."

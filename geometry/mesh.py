@@ -124,6 +124,13 @@ class Mesh:
         """Corners of the convex hull [m], shape (k, 3): how far a link reaches in any direction, they reach."""
         return frozen(_outermost_points(self.vertices), (None, 3), "outermost")
 
+    @property
+    def border_share(self) -> float:
+        """Share of the edges that border one face only: near 0 on models, nearly a half where 30 % of faces lack."""
+        edges = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        counts = np.unique(edges[:, 0] * len(self.vertices) + edges[:, 1], return_counts=True)[1]
+        return float((counts == 1).mean())
+
     @cached_property
     def own_frame(self) -> tuple[Floats, Floats]:
         """A frame that belongs to the surface, whatever its faces and its pose are.

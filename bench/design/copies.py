@@ -2,6 +2,7 @@
 
     python -m bench design-copies LINK ...           # three sheets at most; five searches for each link
     python -m bench design-copies --only noisy LINK ...
+    python -m bench design-copies --samples LINK ... # no search, which draws nothing: the samples that it begins with
 
 Copies: elsewhere (mirrored, rotated and moved, with the faces in another order, at once); refined (a corner amid every
 edge); noisy, corners displaced by 0.1 mm (root mean square); decimated (the refined one, down to the link's own number
@@ -9,7 +10,8 @@ of faces, by fast_simplification, which moves the surface by "off mm", root mean
 
 A column is the area of the sheets of a copy over that of the link as it is, less 1, in percent; "apart" is the largest
 difference between any two, over their median. "of hull" is the same as a share of the hull. "cpu s" is the median of
-the searches.
+the searches. With --samples a column is the largest distance of a sample of a copy from the nearest of the link as it
+is, each in the frame of its own surface, in micrometers; and the median one.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bench.report import head, show
 from coneskin.core.errors import MeshError
@@ -66,13 +69,38 @@ def apart_by(mesh: Mesh, other: Mesh) -> float:
     return float(np.sqrt((off[np.abs(off) < 0.005] ** 2).mean()))
 
 
+def seen(mesh: Mesh) -> np.ndarray:
+    """Return the samples of a hull in the frame of its own surface [m], shape (n, 3)."""
+    middle, ways = mesh.own_frame
+    return np.asarray((sample_surface(mesh, RayCaster(mesh)).points - middle) @ ways)
+
+
+def show_samples(links: list[Path]) -> None:
+    """Print how far the samples of copies are from those of the links."""
+    rows = []
+    for path in links:
+        cells: dict[str, str] = {}
+        own = np.empty((0, 3))
+        for kind, corners, faces in copies(load_mesh(path)):
+            places = seen(make_mesh(np.ascontiguousarray(corners, float), np.ascontiguousarray(faces), path.name))
+            own = places if kind == "as is" else own
+            off = 1e6 * cKDTree(own).query(places)[0]
+            cells[kind] = f"{off.max():.2g}, {np.median(off):.2g}"
+        rows.append([path.name, *(cells.get(kind, "-") for kind in KINDS[1:])])
+    show("samples of copies, um: largest distance and median", ["link", *KINDS[1:]], rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("links", nargs="+", type=Path, metavar="LINK")
     parser.add_argument("--sheets", type=int, default=3, help="sheets at most (default 3)")
     parser.add_argument("--only", action="append", choices=KINDS[1:], help="only these copies")
+    parser.add_argument("--samples", action="store_true", help="no search, only the samples that it begins with")
     arguments = parser.parse_args()
     print(head("numpy", "scipy", "trimesh", "embreex", "fast_simplification"))
+    if arguments.samples:
+        show_samples(arguments.links)
+        return
     rows, worst, apart = [], dict.fromkeys(KINDS, 0), []
     for path in arguments.links:
         try:

@@ -2,6 +2,7 @@
 
     python -m bench design-planted                     # about two minutes
     python -m bench design-planted --picture OUT.png   # the same, and error against run time as a picture
+    python -m bench design-planted --only noise        # bodies with this in their names, without rivals and kernel
     CAD_PYTHON=other/bin/python python -m bench design-planted    # with build123d (Open CASCADE) in another environment
 
 Bodies are tilted and off the origin. "tilt" is the angle of the axis found against the planted one, "shift" its
@@ -125,6 +126,10 @@ def bodies() -> Iterator[Body]:
     )
     for microns in (50, 200, 500, 1000):
         yield body(f"cone, noise {microns} um", turned(list(cone)), cone, noise=microns * 1e-6)
+    corners, faces = turned(list(cone))
+    for share in (0.1, 0.3):
+        kept = np.random.default_rng(1).random(len(faces)) > share
+        yield body(f"cone, {share:.0%} missing", (corners, faces[kept]), cone)
     yield body("tube with holes", holed(turned(list(tube), 360, 160)), tube)
     for facets in (36, 18):
         yield body(f"tube of {facets} facets", turned(list(tube), facets, 1), tube)
@@ -284,13 +289,14 @@ def print_kernel() -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--picture", type=Path, help="file for error against run time (PNG)")
+    parser.add_argument("--only", default="", help="what the names of the bodies hold; leaves the rivals out")
     arguments = parser.parse_args()
     print(head("numpy", "scipy", "trimesh", "embreex", "pyransac3d"))
     print(
         f"\n{'body':20}{'method':22}{'ms':>7}{'tilt deg':>10}{'shift mm':>10}{'d radius':>10}{'cover':>8}{'off mm':>8}"
     )
     dots: dict[str, list[tuple[float, float]]] = {}
-    for one in bodies():
+    for one in (one for one in bodies() if arguments.only in one.name):
         rays = RayCaster(one.mesh)
         hull = sample_surface(one.mesh, rays)
         start = time.process_time()
@@ -303,23 +309,25 @@ def main() -> None:
             print(f"{one.name:20}{'coneskin':22}{1e3 * spent:7.0f}{'-':>10}{'-':>10}{'-':>10}{'-':>8}{off}  {share}")
             continue
         found = [("coneskin", spent, ours(one, fit), f"{area / planted_area(one) - 1.0:+8.1%}{off}")]
-        if find_spec("pyransac3d"):
+        if find_spec("pyransac3d") and not arguments.only:
             start = time.process_time()
             try:
                 found.append(("RANSAC, least squares", 0.0, ransac(one, hull), ""))
             except (ValueError, IndexError, np.linalg.LinAlgError):
                 found.append(("RANSAC, least squares", 0.0, (math.nan,) * 3, ""))
             found[-1] = (found[-1][0], time.process_time() - start, *found[-1][2:])
-        start = time.process_time()
-        found.append(("trimesh, trimmed", 0.0, bounding(one), ""))
-        found[-1] = (found[-1][0], time.process_time() - start, *found[-1][2:])
+        if not arguments.only:
+            start = time.process_time()
+            found.append(("trimesh, trimmed", 0.0, bounding(one), ""))
+            found[-1] = (found[-1][0], time.process_time() - start, *found[-1][2:])
         for method, seconds, (tilt, shift, radius), rest in found:
             print(
                 f"{one.name:20}{method:22}{1e3 * seconds:7.0f}{tilt:10.4f}{shift:10.4f}{radius:+10.4f}{rest}",
                 flush=True,
             )
             dots.setdefault(method, []).append((seconds, max(abs(shift), abs(radius))))
-    print_kernel()
+    if not arguments.only:
+        print_kernel()
     if arguments.picture:
         draw(dots, arguments.picture)
 

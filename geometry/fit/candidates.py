@@ -24,7 +24,7 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import InfiniteCone, fit_cone
-from .fit_options import FitOptions
+from .fit_options import MOST_TOLERANCE, FitOptions
 from .profile import AxisFrame, RadialProfile, measure_profile
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
@@ -271,6 +271,10 @@ def _same_side(cone: InfiniteCone, other: InfiniteCone) -> bool:
     return abs(cone.radius - radius) < _MAX_DUPLICATE_RADIUS and abs(cone.half_angle - other.half_angle) < 0.02
 
 
+_LEAST_ROUGHNESS = 0.3e-3  # m; less is details of the link
+_ROUGH_TOLERANCE = 2.0  # times the roughness
+_TORN_SHARE = 0.12  # of the edges; models have up to 0.06
+_TORN_BRIDGE = 0.030  # m
 _SEARCH_SAMPLES = 6000  # points on the mesh from which the axes are found, whatever is asked
 
 
@@ -310,6 +314,24 @@ class SampledLink:
     def worth(self) -> Floats | None:
         """What each counted sample counts, shape (n,); None where all count the same."""
         return None if self.weights is None else self.weights.at(self.counted.points)
+
+    def eased(self, options: FitOptions) -> tuple[FitOptions, tuple[str, ...]]:
+        """Return options that allow for noise of the mesh and for faces that it lacks, with a note on each of these."""
+        notes, rough, torn = [], self.hull.roughness(), self.mesh.border_share
+        if rough > _LEAST_ROUGHNESS:
+            tolerance = min(options.tolerance + _ROUGH_TOLERANCE * rough, MOST_TOLERANCE)
+            notes.append(
+                f"the mesh is rough by {1e3 * rough:.1f} mm (root mean square): what follows its mean within "
+                f"{1e3 * options.tolerance:g} mm is up to {1e3 * tolerance:.1f} mm from it, which is allowed"
+            )
+            options = replace(options, tolerance=tolerance)
+        if torn > _TORN_SHARE and options.max_bridge < _TORN_BRIDGE:
+            notes.append(
+                f"faces are missing, {100.0 * torn:.0f} % of the edges border one only: holes of up to "
+                f"{1e3 * _TORN_BRIDGE:g} mm are spanned"
+            )
+            options = replace(options, max_bridge=_TORN_BRIDGE)
+        return options, tuple(notes)
 
     def profile(
         self, frame: AxisFrame, grid: tuple[int, int], max_bridge: float, weighed: bool = True

@@ -303,6 +303,7 @@ def find_cones(
 
 def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]) -> LinkFit:
     """Find the frusta that cover most of a sampled link; ``say`` is called with the name of each step."""
+    options, flaws = link.eased(options)
     asked = {item.name: getattr(options, item.name) for item in fields(FitOptions)}
     asked |= {"max_sheets": options.most_sheets, "weights": link.weights}
     # the rays about an axis begin at a direction of the link's own, so that the sheets do not depend on its frame
@@ -321,7 +322,7 @@ def fit_cones(link: SampledLink, options: FitOptions, say: Callable[[str], None]
         tolerance=tolerance,
         link_length=float(np.ptp(off @ np.linalg.eigh(off.T @ off)[1][:, 2])),
         hull_area=link.hull_area,
-        notes=link.mesh.notes,
+        notes=(*link.mesh.notes, *flaws),
         reason="",
         candidates=len(link.axes),
         needed_tolerance=tolerance,

@@ -15,6 +15,8 @@ from coneskin.geometry.ray_casting import RayCaster
 
 _MIN_NORMAL_COSINE = 0.9  # cosine between the normals of the hull and of a sheet on it
 _NEIGHBOR_COUNT = 8  # samples, half of which must face one way where the hull is flat: beside an edge no more do
+_ROUGH_NEIGHBORS, _ROUGH_PLACES = 24, 600  # samples of a patch, about 10 mm around its middle, and patches
+_ROUGH_SHARE, _ROUGH_SCALE = 0.1, 3.1  # of the patches that are smoother; noise over what a quadric leaves of it there
 _FLAT_COSINE = math.cos(math.radians(2.0))
 
 
@@ -40,6 +42,24 @@ class SurfaceSamples:
     def some(self, count: int) -> Ints:
         """Return the indices of so many points, or of all if there are fewer, evenly over the hull."""
         return np.arange(min(count, len(self))) * len(self) // min(count, len(self))
+
+    def roughness(self) -> float:
+        """Return the noise of the hull [m], root mean square: how far samples lie from quadrics through their patches.
+
+        The smoothest tenth of the patches decides, since edges and details of a link are no noise: it gives at most 0.2
+        mm on 48 links of eight makers, 0.5 mm for 0.5 mm of noise and 1.0 mm for 1 mm.
+        """
+        from scipy.spatial import cKDTree
+
+        if len(self) < _ROUGH_NEIGHBORS:
+            return 0.0
+        near = cKDTree(self.points).query(self.points[self.some(_ROUGH_PLACES)], _ROUGH_NEIGHBORS)[1]
+        off = self.points[near] - self.points[near].mean(axis=1, keepdims=True)
+        x, y, z = np.moveaxis(off @ np.linalg.svd(off, full_matrices=False)[2].swapaxes(1, 2), -1, 0)
+        quadric = np.linalg.qr(np.stack([x * x, x * y, y * y, x, y, np.ones_like(x)], axis=-1))[0]
+        left = z[..., None] - quadric @ (quadric.swapaxes(1, 2) @ z[..., None])
+        noise = np.sqrt((left**2).sum(axis=(1, 2)) / (_ROUGH_NEIGHBORS - quadric.shape[2]))
+        return _ROUGH_SCALE * float(np.quantile(noise, _ROUGH_SHARE))
 
     def subset(self, chosen: Bools) -> SurfaceSamples:
         """Return the chosen points; ``chosen`` has the shape (n,)."""

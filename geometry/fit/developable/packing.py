@@ -87,6 +87,7 @@ def with_developables(
     """
     if options.wrap is not None and options.wrap != math.tau:
         return cones
+    options = link.eased(options)[0]
     most, tolerance = options.most_sheets, options.tolerance
     say("looking for rulings")
     worth = np.ones(len(link.counted)) if link.worth is None else link.worth

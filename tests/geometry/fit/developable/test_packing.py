@@ -138,6 +138,8 @@ def test_other_sheets_take_the_place_of_cones_only_for_a_clear_gain(
     }.items():
         monkeypatch.setattr(packing, name, lambda *_, name=name, value=value: (refused.append(name), value)[1])
     options = SimpleNamespace(wrap=None, most_sheets=1, tolerance=1e-3, allow_hull=False)
-    link = SimpleNamespace(counted=range(4), worth=None, hull=None, axes=None, mesh=None)
+    link = SimpleNamespace(
+        counted=range(4), worth=None, hull=None, axes=None, mesh=None, eased=lambda asked: (asked, ())
+    )
     assert packing.with_developables(link, cones, options) is cones  # type: ignore[arg-type]
     assert ("hull_note" in refused) is taken
