@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from coneskin.cli import main
 from coneskin.core.errors import GeometryError
 from coneskin.design.first_scene import _virtual, read_designs
-from coneskin.design.robot_design import _outside, design_robot
+from coneskin.design.robot_design import _outside, _renumbered, design_robot
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.frustum import Frustum
@@ -47,6 +47,20 @@ def write_robot(folder: Path, stop_z: float) -> Path:
     return path
 
 
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ([2], ["of steel", "the seam of sheet 1 faces (0, 0, 1)"]),
+        ([1, 3], ["of steel", "the seams of sheets 1 and 2 face (1, 0, 0)"]),
+        ([3], ["of steel", "the seam of sheet 1 faces (1, 0, 0)"]),
+        ([], ["of steel"]),
+    ],
+)
+def test_notes_speak_of_the_sheets_that_are_left_by_their_new_numbers(numbers: list[int], said: list[str]) -> None:
+    notes = ["of steel", "the seam of sheet 2 faces (0, 0, 1)", "the seams of sheets 1 and 3 face (1, 0, 0)"]
+    assert list(_renumbered(notes, numbers)) == said
+
+
 def test_a_joint_has_its_place_its_unit_axis_and_no_more_than_a_turn(tmp_path: Path) -> None:
     (joint,) = urdf_joints(write_robot(tmp_path, 0.1))
     assert (joint.parent, joint.child, joint.axis) == ("upper_arm_link", "forearm_link", (0.0, 0.0, 1.0))
@@ -61,7 +75,10 @@ def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tm
     assert [one.link for one in design.offered] == ["upper_arm_link", "forearm_link"]
     assert [one.wires for one in design.offered] == [4, 8]
     assert design.offered[1].total == pytest.approx(sum(one.area for one in design.offered))
-    assert (design.included, sorted(path.name for path in out.iterdir() if path.is_dir())) == (1, ["upper_arm_link"])
+    assert (design.included, sorted(path.name for path in out.iterdir() if path.is_dir())) == (
+        1,
+        ["nested", "upper_arm_link"],
+    )
     rows = re.findall(r"^\| (\d+) \| (\w+) \|.*\| (yes|no) \|$", (out / "report.md").read_text(), re.MULTILINE)
     assert rows == [("4", "upper_arm_link", "yes"), ("8", "forearm_link", "no")]
     (sheet,) = json.loads((out / "upper_arm_link" / "design.json").read_text())["sheets"]
@@ -97,6 +114,17 @@ def test_one_scene_takes_the_sensors_of_all_links(
     assert "8 wires" in said
     assert "next: coneskin init skin --simulated --arm UR10e" in said, "by the name of the file, or a word for xacro"
     assert (tmp_path / "skin" / "curve.png").is_file()
+    top, data = (
+        (tmp_path / "skin" / "report.md").read_text(),
+        json.loads((tmp_path / "skin" / "design.json").read_text()),
+    )
+    assert {"robot.png", "curve.png", "nested/aluminium-foil-1.dxf"} < set(data["files"])
+    assert all((tmp_path / "skin" / file).is_file() for file in data["files"])
+    shopping, work = top.partition("## Everything to buy or to cut")[2].split("## Order of work")
+    both = ["upper_arm_link sheet 1 part 2", "forearm_link sheet 1 part 2"]
+    assert all(part in shopping for part in both), "one list for all sheets"
+    assert "| 4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts | 2 | cable |" in shopping
+    assert work.index("| 0 | upper_arm_link") < work.index("| 1 | forearm_link") < work.index("## Yours to decide")
     assert main(["init", "skin", "--simulated", "--arm", "UR5e"]) == 0
     assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
     scene = parse_scene((tmp_path / "scene.toml").read_text(), "scene.toml", tmp_path)

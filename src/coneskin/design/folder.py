@@ -22,7 +22,7 @@ from coneskin.core.files import explain_os_error
 from coneskin.core.text import printable, read_json
 from coneskin.geometry.drawing.cut_sheet import CutSheet, make_test_piece, nest_sheets
 from coneskin.geometry.drawing.dxf import ArcStyle, to_dxf
-from coneskin.geometry.drawing.nesting import nest_on_beds
+from coneskin.geometry.drawing.nesting import MaterialBed, nest_on_beds
 from coneskin.geometry.drawing.pdf import PageSize, to_pdf
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.solid import WrappedLayer, require_step_writer, to_stl, write_step
@@ -30,7 +30,7 @@ from coneskin.geometry.solid import WrappedLayer, require_step_writer, to_stl, w
 from .report import report_text
 from .sheets.sheet_design import SheetDesign
 from .sheets.summary import design_summary, material_rows, sensor_toml, sheet_folder
-from .workshop.build_figures import measure_build
+from .workshop.build_figures import BuildFigures, measure_build
 from .workshop.placement import find_datum_faces
 
 if TYPE_CHECKING:
@@ -162,6 +162,25 @@ class _Draft:
         self.write(stem.with_name(f"{stem.name}.dxf"), to_dxf(sheets, options.arcs, options.tolerance))
         self.write(stem.with_name(f"{stem.name}.svg"), to_svg(sheets, title))
 
+    def write_bed(self, bed: MaterialBed, options: FileOptions) -> None:
+        self.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, options)
+
+
+def _measured(sheets: tuple[SheetDesign, ...], mesh: Mesh | None, frame: str, first: int) -> list[BuildFigures]:
+    """Return the figures for building the sheets of a link, the first of which has that number as a sensor."""
+    faces = () if mesh is None else find_datum_faces(mesh)
+    return [
+        measure_build(design, first + index, frame, mesh, sheets[:index], faces, sheets)
+        for index, design in enumerate(sheets)
+    ]
+
+
+def _nested(sheets: Sequence[SheetDesign], options: FileOptions) -> tuple[tuple[MaterialBed, ...], tuple[str, ...]]:
+    """Return the parts of sheets on beds, with a test piece of each material, and a sentence for what is larger."""
+    cuts = [cut for design in sheets for cut in design.cuts]
+    pieces = [make_test_piece(material) for material in dict.fromkeys(cut.material for cut in cuts)]
+    return nest_on_beds([*cuts, *pieces], *options.bed, options.bed_gap)
+
 
 def write_design(
     folder: Path | str,
@@ -178,6 +197,7 @@ def write_design(
     replace: bool = False,
     progress: Callable[[str], None] = lambda _: None,
     first_sensor: int = 0,
+    figures: Sequence[BuildFigures] | None = None,
 ) -> dict[str, Any]:
     """Write everything that a person needs to build the sheets, and the guard to use them.
 
@@ -195,6 +215,7 @@ def write_design(
         replace: True to allow an earlier design in the folder; files that are not of that design stay.
         progress: called with the name of each step.
         first_sensor: number of the first sensor in the wire format.
+        figures: for building each sheet; None to work them out.
 
     Returns:
         the content of design.json; "files" lists all files of the design, as paths in the folder.
@@ -208,20 +229,14 @@ def write_design(
     if options.step:
         _require_step(sheets)
     title, source, frame, *notes = map(printable, (title, source, frame, *notes))  # a file's name may be no text
-    faces = () if mesh is None else find_datum_faces(mesh)
-    figures = [
-        measure_build(design, first_sensor + index, frame, mesh, sheets[:index], faces, sheets)
-        for index, design in enumerate(sheets)
-    ]
+    figures = figures or _measured(sheets, mesh, frame, first_sensor)
     data: dict[str, Any] = {"link": source or title, "frame": frame, "notes": list(notes)}
     data["sheets"] = [
         design_summary(design) | item.as_data(design) for design, item in zip(sheets, figures, strict=True)
     ]
     if fit is not None:
         data["bare_areas"] = [{"share": round(b.share, 4), "reason": b.reason} for b in fit.bare_areas]
-    cuts = [cut for design in sheets for cut in design.cuts]
-    pieces = [make_test_piece(material) for material in dict.fromkeys(cut.material for cut in cuts)]
-    beds, larger = nest_on_beds([*cuts, *pieces], *options.bed, options.bed_gap)
+    beds, larger = _nested(sheets, options)
     for sentence in larger:
         progress(sentence)
     data["beds"] = [
@@ -256,7 +271,7 @@ def write_design(
                 write_step(draft.place(place / "wrapped.step"), _wrapped_layers(design))
         for bed in beds:
             progress(f"writing {bed.slug}")
-            draft.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, options)
+            draft.write_bed(bed, options)
         rows = material_rows(sheets)
         table = io.StringIO()
         writer = csv.DictWriter(table, rows[0], lineterminator="\n")

@@ -7,12 +7,13 @@ link shows where the sheets are, their ends, and the faces to measure from.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from coneskin.geometry.mesh import Mesh
+from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
 from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
@@ -205,10 +206,7 @@ def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
     Each is on that side of the picture to which its end lies from the middle of the sheet, so that no line crosses the
     sheet to its other end.
     """
-    from matplotlib.patheffects import withStroke
-
-    below = {"left": -math.inf, "right": -math.inf}
-    names: list[tuple[Any, str, str, str]] = []
+    names: list[tuple[Any, bool, str, str]] = []
     for index, design in enumerate(designs):
         side = design.place.frustum
         phi = side.wrap * np.linspace(0.1, 0.9, 121)  # at a corner a name could be that of the edge
@@ -217,17 +215,25 @@ def _name_ends(axes: Any, designs: Sequence[SheetDesign], view: _View) -> None:
             points, normals = design.outer_face(np.full(len(phi), u), phi)
             seen, flat = view.sees(points, normals), view.flat(points)
             if seen.mean() >= 0.2:  # else the other side shows it better
-                where, sign = ("right", 1.0) if flat[:, 0].mean() >= middle else ("left", -1.0)
-                at = flat[seen][(sign * flat[seen, 0]).argmax()]
+                right = bool(flat[:, 0].mean() >= middle)
+                at = flat[seen][(flat[seen, 0] if right else -flat[seen, 0]).argmax()]
                 joints = "".join(f", joint {joint}" for joint in design.joints.get(f"end {end}", ()))
-                names.append((at, where, f"{design.name}, end {end}{joints}", _SHEET_COLOURS[index % 4]))
+                names.append((at, right, f"{design.name}, end {end}{joints}", _SHEET_COLOURS[index % 4]))
+    _write_beside(axes, view, names)
+
+
+def _write_beside(axes: Any, view: _View, names: Iterable[tuple[Any, bool, str, str]]) -> None:
+    """Write names with colours to the left or, where told, to the right of a picture, with lines to their places."""
+    from matplotlib.patheffects import withStroke
+
+    below = [-math.inf, -math.inf]
     halo = [withStroke(linewidth=3.0, foreground="white")]
-    for at, where, name, colour in sorted(names, key=lambda item: float(item[0][1])):
-        below[where] = max(below[where] + 0.06 * view.size, float(at[1]))
-        edge = view.high[0] + 0.04 * view.size if where == "right" else view.low[0] - 0.04 * view.size
-        text = {"color": colour, "fontsize": 9, "va": "center", "ha": "left" if where == "right" else "right"}
+    for at, right, name, colour in sorted(names, key=lambda item: float(item[0][1])):
+        below[right] = max(below[right] + 0.06 * view.size, float(at[1]))
+        edge = view.high[0] + 0.04 * view.size if right else view.low[0] - 0.04 * view.size
+        text = {"color": colour, "fontsize": 9, "va": "center", "ha": "left" if right else "right"}
         arrow = {"arrowstyle": "-", "color": INK_COLOUR, "lw": 0.8, "shrinkA": 0, "shrinkB": 0, "path_effects": halo}
-        axes.annotate(name, at, (edge, below[where]), arrowprops=arrow, annotation_clip=False, **text)
+        axes.annotate(name, at, (edge, below[right]), arrowprops=arrow, annotation_clip=False, **text)
         axes.plot(*at, "o", color=INK_COLOUR, markersize=3, path_effects=halo)
 
 
@@ -253,6 +259,43 @@ def _border(design: SheetDesign) -> tuple[Any, Any, list[tuple[Any, Any]]]:
     along, around = np.linspace(0.0, side.slant, 41), np.linspace(0.0, side.wrap, 181)
     ends = [(np.full(len(around), u), around) for u in (0.0, side.slant)]
     return along, around, [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
+
+
+def draw_robot(
+    figure: Any, meshes: Mapping[str, Mesh], poses: Mapping[str, Pose], sheets: Sequence[tuple[str, SheetDesign]]
+) -> None:
+    """Draw a robot from two opposite sides with the names of its sheets.
+
+    Args:
+        figure: an empty figure of matplotlib, without a layout engine.
+        meshes: of its links, each in the frame of that.
+        poses: of these frames.
+        sheets: each with the name of its link.
+    """
+    shown = [poses.get(link, Pose()).apply_all(sheet.outer_triangles().reshape(-1, 3)) for link, sheet in sheets]
+    links = [mesh.moved(poses.get(link, Pose())).triangles for link, mesh in meshes.items()]
+    body, owner = _body([*(corners.reshape(-1, 3, 3) for corners in shown), *links])
+    hues = [_SHEET_COLOURS[index % 4] for index in range(len(sheets))]
+    paints = _palette([*hues, *[_LINK_COLOUR] * len(links)])
+    for side, way in enumerate((np.array([0.5, -1.0, 0.45]), np.array([-0.5, 1.0, 0.45]))):
+        axes = figure.add_axes((0.0, 0.52 - 0.52 * side, 1.0, 0.48))
+        view = _View(body, way)
+        view.draw(axes, lambda hit, _: paints[owner[hit]], way + (0.4, 0.3, 0.5))
+        view.draw_frame(axes)
+        names = []
+        for (link, sheet), colour in zip(sheets, hues, strict=True):
+            cone, pose = sheet.place.frustum, poses.get(link, Pose())
+            points, normals = sheet.outer_face(
+                *np.meshgrid(np.linspace(0.0, cone.slant, 9), np.linspace(0.0, cone.wrap, 49))
+            )
+            points, turned = pose.apply_all(points.reshape(-1, 3)), normals.reshape(-1, 3) @ np.array(pose.rotation).T
+            seen = view.sees(points, turned)
+            if seen.mean() >= 0.1:  # else the other side shows it better
+                flat = view.flat(points[seen])
+                at = flat[np.linalg.norm(flat - flat.mean(axis=0), axis=1).argmin()]
+                right = bool(at[0] > 0.5 * (view.low[0] + view.high[0]))
+                names.append((at, right, f"{link}, {sheet.name}", colour))
+        _write_beside(axes, view, names)
 
 
 def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weights: TouchWeights) -> None:

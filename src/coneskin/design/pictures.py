@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from coneskin.core.picture_file import degree_ticks, picture_style
 from coneskin.geometry.displacement_map import heights_by_ray
 from coneskin.geometry.ray_casting import RayCaster
 
-from .link_picture import draw_jig, draw_link, draw_weights
+from .link_picture import draw_jig, draw_link, draw_robot, draw_weights
 from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
     from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
+    from coneskin.geometry.pose import Pose
 
 
 def draw_pictures(
@@ -135,6 +136,18 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
     seam = "seam" if design.has_seam else "edge"
     for at in (0.0, 1.0):
         axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")
+
+
+def draw_skin(
+    file: Path, meshes: Mapping[str, Mesh], poses: Mapping[str, Pose], sheets: Sequence[tuple[str, SheetDesign]]
+) -> None:
+    """Write the picture of a robot with its sheets to a file; the rest as for ``draw_robot``."""
+    from matplotlib.figure import Figure
+
+    with picture_style():
+        figure = Figure(figsize=(10, 9))
+        draw_robot(figure, meshes, poses, sheets)
+        figure.savefig(file, dpi=130, bbox_inches="tight", pad_inches=0.15)
 
 
 def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], included: int) -> None:

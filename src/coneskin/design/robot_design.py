@@ -11,7 +11,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,9 +27,11 @@ from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_links
 
-from .folder import DESIGN_FILE, FileOptions, _new_folder, check_target
+from .folder import DESIGN_FILE, FileOptions, _Draft, _measured, _nested, _new_folder, check_target
 from .link_design import LinkDesign, _fit_link, room_for
+from .report import _table
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
+from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -55,6 +58,14 @@ class _Offer(NamedTuple):
     area: float  #: of that, what can be touched [m2]
     wires: int  #: with all before
     total: float  #: area that can be touched, with all before [m2]
+
+
+class _BuiltSheet(NamedTuple):
+    """A sheet that is written."""
+
+    link: str
+    sheet: SheetDesign
+    figures: BuildFigures
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,16 +158,31 @@ def _outside(sheet: SheetDesign) -> Floats:
 
 
 def _assembled(
-    design: LinkDesign, fits: Sequence[FittedSheet], options: DesignOptions, beside: Sequence[_SweptLink]
+    design: LinkDesign, fits: Mapping[int, FittedSheet], options: DesignOptions, beside: Sequence[_SweptLink]
 ) -> LinkDesign:
-    """Return a link with sheets at some places, and a note why not for each that finds no room."""
+    """Return a link with sheets at some places, by their numbers before, and a note why not for each without room."""
     if design.fit is None or not fits:
         return dataclasses.replace(design, sheets=())
-    fit = dataclasses.replace(design.fit, sheets=tuple(fits), bare_areas=())
+    fit = dataclasses.replace(design.fit, sheets=tuple(fits.values()), bare_areas=())
     named = dataclasses.replace(options, link=design.name)
     sheets, left_out = design_assembly(fit, named, design.mesh, beside=beside)
+    numbers = [number for sheet in sheets for number, one in fits.items() if one is sheet.fit]
+    notes = (*_renumbered(design.notes, numbers), *left_out)
     fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
-    return dataclasses.replace(design, sheets=sheets, fit=fit, notes=(*design.notes, *left_out))
+    return dataclasses.replace(design, sheets=sheets, fit=fit, notes=notes)
+
+
+def _renumbered(notes: Sequence[str], numbers: Sequence[int]) -> Iterator[str]:
+    """Yield notes with the seams of those sheets that are left, by their new numbers."""
+    for note in notes:
+        found = re.match(r"the seams? of sheets? ([\d, and]+) faces? (.*)", note)
+        if found is None:
+            yield note
+            continue
+        now = [str(numbers.index(int(old)) + 1) for old in re.findall(r"\d+", found[1]) if int(old) in numbers]
+        if now:
+            several = "s" if len(now) > 1 else ""
+            yield f"the seam{several} of sheet{several} {' and '.join(now)} face{'' if several else 's'} {found[2]}"
 
 
 def design_robot(
@@ -210,11 +236,12 @@ def design_robot(
         progress(f"{name}: placing sheets, tabs and cables beside what moves")
         sheets = () if design.fit is None else design.fit.sheets
         cleared = [_clear(sheet, options.stack.thickness, beside[name]) for sheet in sheets]
+        left = {number: one for number, one in enumerate(cleared, 1) if one is not None}
+        found[name] = skins[name] = _assembled(design, left, options, beside[name])
         if any(one is not sheet for one, sheet in zip(cleared, sheets, strict=True)):
-            reasons.append(f"{name}: its sheets are shortened to clear the next link")
-        found[name] = skins[name] = _assembled(
-            design, [one for one in cleared if one is not None], options, beside[name]
-        )
+            shortened = "its sheets are shortened to clear the next link"
+            none = f"carries none: less than {1e3 * _LEAST_SLANT:g} mm of a sheet are clear of the next link"
+            reasons.append(f"{name}: {shortened}" if found[name].sheets else f"{name} {none}")
         reasons += [f"{name}: {why}" for why in found[name].notes if why not in design.notes]
     progress("looking at what can be touched")
     sizes = _touchable(found, joints, meshes)
@@ -230,25 +257,35 @@ def design_robot(
         )
     with _new_folder(Path(folder), replace) as draft:
         result = RobotDesign(tuple(offered), included, tuple(reasons))
-        written, sensors = [], 0
+        built: list[_BuiltSheet] = []
         for name, design in found.items():
             wanted = {one.number for one in offered[:included] if one.link == name}
             if not wanted:
                 continue
             if len(wanted) < len(design.sheets):
-                places = [one.fit for k, one in enumerate(design.sheets, 1) if k in wanted and one.fit is not None]
+                places = {k: one.fit for k, one in enumerate(design.sheets, 1) if k in wanted and one.fit is not None}
                 design = _assembled(design, places, options, beside[name])
+            figures = _measured(design.sheets, design.mesh, design.frame, len(built))
             design.written(
                 draft / name,
                 f"{robot}#{name}",
                 options=files,
                 pictures=pictures,
                 progress=progress,
-                first_sensor=sensors,
+                first_sensor=len(built),
+                figures=figures,
             )
-            sensors += len(design.sheets)
-            written.append(name)
-        _write_robot(draft, result, written, str(robot), pictures)
+            built += [_BuiltSheet(name, *one) for one in zip(design.sheets, figures, strict=True)]
+        progress("drawing and writing what holds for the robot")
+        if pictures:
+            from .pictures import draw_curve, draw_skin
+
+            angles = [min(max(0.0, joint.lower), joint.upper) for joint in joints]
+            drawn = [(one.link, one.sheet) for one in built]
+            draw_skin(draft / "robot.png", meshes, link_poses(joints, angles), drawn)
+            names = [f"{one.link} {one.number}" for one in offered]
+            draw_curve(draft / "curve.png", [(one.wires, one.total) for one in offered], names, included)
+        _write_robot(draft, result, built, str(robot), files or FileOptions(), pictures)
     return result
 
 
@@ -306,9 +343,17 @@ def _touchable(
     return sizes
 
 
-def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot: str, pictures: bool) -> None:
-    """Write what holds for the robot: the curve as table and picture, the reasons, and the list of its files."""
-    rows = [("wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included")]
+def _write_robot(
+    folder: Path, design: RobotDesign, built: Sequence[_BuiltSheet], robot: str, files: FileOptions, pictures: bool
+) -> None:
+    """Write what holds for the robot: its report, its parts on beds together, and the list of its files."""
+    draft = _Draft(folder)
+    named = [dataclasses.replace(one.sheet, name=f"{one.link} {one.sheet.name}") for one in built]
+    beds, larger = _nested(named, files)
+    for bed in beds:
+        draft.write_bed(bed, files)
+    head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
+    rows = []
     for count, one in enumerate(design.offered, 1):
         areas = f"{1e4 * one.active:.1f}", f"{1e4 * one.area:.1f}", f"{1e4 * one.total:.1f}"
         rows.append((str(one.wires), one.link, str(one.number), *areas, "yes" if count <= design.included else "no"))
@@ -318,22 +363,49 @@ def _write_robot(folder: Path, design: RobotDesign, links: Sequence[str], robot:
         f"{design.included} sheets, {_WIRES_PER_SHEET * design.included} wires. Touchable is the active area times the "
         f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
+        *_table(head, rows),
     ]
-    lines += ["| " + " | ".join(row) + " |" for row in (rows[0], ("---",) * 7, *rows[1:])]
     if pictures:
-        from .pictures import draw_curve
-
-        names = [f"{one.link} {one.number}" for one in design.offered]
-        draw_curve(folder / "curve.png", [(one.wires, one.total) for one in design.offered], names, design.included)
+        lines += ["", "![The robot with its sheets from two sides.](robot.png)"]
         lines += ["", "![Touchable area against wires; what is included is filled.](curve.png)"]
-    lines += ["", *(f"* {reason}" for reason in design.reasons)]
-    lines += [f"* [{name}]({name}/report.md): how its sheets are built" for name in links]
+    lines += ["", *(f"* {reason}" for reason in (*design.reasons, *larger))]
     lines += [
-        "* Sheets, tabs, ties and cables are clear of the links beside theirs, over the whole range of the joint "
-        "between, and sheets of each other. Not looked at: links two joints away, joints that slide, and how a cable "
-        "passes a joint.",
+        "",
+        "## Everything to buy or to cut",
+        "",
+        "For all sheets together; each report has the list of its link.",
+    ]
+    lines += ["", *_table(("item", "quantity", "for"), bill_of_materials(named, [one.figures for one in built], beds))]
+    lines += [
+        "",
+        "## Order of work",
+        "",
+        "Cut all parts, finish every sheet on the bench, then wrap link after link in this order, each by its guide.",
+        "",
+    ]
+    guides = [
+        (
+            str(number),
+            one.link,
+            one.sheet.name,
+            f"[report]({one.link}/report.md)",
+            f"{in_mm(one.sheet.way.connector_length)} from {side_name(one.sheet.way.side)}",
+        )
+        for number, one in enumerate(built)
+    ]
+    lines += [
+        *_table(("sensor number", "link", "sheet", "guide", "connector, along the cable"), guides),
+        "",
+        "## Yours to decide",
+        "",
+        "* Where the boards sit: each sheet has one of its own, and this design ends at its connector. On the link of "
+        f"its sheet, no more than the board's cable crosses joints; at the base, {_WIRES_PER_SHEET} wires do.",
+        "* How each cable passes the joints between connector and board, with slack for their whole range.",
+        "* Whether links two joints away, or what slides, come to a sheet: this was not looked at. Sheets, tabs, ties "
+        "and cables are clear of the links beside theirs, over the whole range of the joint between, and sheets of "
+        "each other.",
     ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-    data = {"robot": robot, "links": list(links), "files": [*files, DESIGN_FILE]}
+    written = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    data = {"robot": robot, "links": list(dict.fromkeys(one.link for one in built)), "files": [*written, DESIGN_FILE]}
     (folder / DESIGN_FILE).write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
