@@ -21,6 +21,7 @@ from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.protocol import HeartbeatDriver, SliderDriver, require
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.stream import TouchStream
 
 from .activation import Activation, ActivationStep, ControllerNeeds
@@ -159,7 +160,7 @@ class GuardCore:
             )
         for detector in self._stream.detectors:
             name, fault, age = detector.sensor.name, detector.fault, detector.age(now)
-            if age == math.inf:
+            if age == math.inf and fault in {None, Fault.SILENT}:
                 blockers.append(f"{name}: waits for its first valid frame; if none comes, check power and cable")
             elif age > self._limits.skin_silence:
                 blockers.append(f"{name}: no valid frame" + (f" ({fault.value})" if fault else ""))

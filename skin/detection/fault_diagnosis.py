@@ -22,6 +22,7 @@ from coneskin.skin.wire import Frame
 
 from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
+from .frame.reading import judge
 from .frame.untouched import UntouchedCurrents, bounded
 
 _SHORT_CONDUCTANCE = 10.0  # S; of a short
@@ -377,6 +378,17 @@ class FaultDiagnosis:
             self.words = found.words
         self._name = fault
         return fault
+
+
+def explain_frame(sensor: Sensor, frame: Frame) -> str:
+    """Say in words what is broken, by one frame of a sensor at rest; empty where it does not tell, or nothing is."""
+    fault = judge(sensor, frame)[1]
+    if fault not in DIAGNOSED_FAULTS:
+        return ""
+    diagnosis = FaultDiagnosis(sensor, UntouchedCurrents(sensor, 0.0))
+    while diagnosis.feed(frame, fault) is None:
+        pass
+    return diagnosis.words
 
 
 class _Fit:

@@ -90,6 +90,7 @@ class Cause(Enum):
     COUNTS_STUCK = "read the converter anew for each frame, and see whether it has started at all"
     NO_NOISE = "a reading that never changes would hide an open wire: read it anew for each frame (the guard: STUCK)"
     SATURATED = "every reading stands at full scale: check the converter's reference and its channel"
+    SHORT = "part what touches, at tabs, connector and solder; what stays with the sensor unplugged is the board's"
     SUPPLY_ZERO = "measure the drive supply and put its counts into the frame"
     CURRENTS_ZERO = "measure the drive current of each phase over the shunt and put its counts into the frame"
     RADIAL_CURRENT_ZERO = "measure the current of the radial phase (B at the supply, A at ground); or a wire is open"

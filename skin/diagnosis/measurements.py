@@ -8,6 +8,10 @@ from math import gcd, sqrt
 from statistics import median_high
 
 from coneskin.core.finding import Finding
+from coneskin.skin.detection.fault_diagnosis import explain_frame
+from coneskin.skin.detection.frame.contact_matrix import FrameInversion
+from coneskin.skin.detection.frame.faults import Fault
+from coneskin.skin.detection.frame.untouched import UntouchedZero
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
@@ -23,6 +27,8 @@ _GUIDE_PLACES = tuple(MEASURED.index(name) for name in ("radial_c", "radial_d", 
 _MIN_FRAMES = 8
 _STUCK_FRAMES = 400  # in a row with the same reading
 _REMARKABLE_SHARE = 0.05  # of a drive current; layers vary by more, which a guard learns and a design does not know
+_RAIL_SHARE = 0.95  # of full scale, from which on an amplifier may stand at its rail
+_SHORT_SIEMENS, _CORNER = 0.1, 0.05  # a firm touch is 0.002 S; parts of a side and of the supply
 _ZERO_SLACK = 2  # counts; a drive current that is no more than this above the zero is none
 _UNTOUCHED_SHARE = 0.03  # of the supply, on both guides of the touch phase together
 _REMARKABLE_HUM = 0.004  # of the supply, on a guide; it moves a place by as much of the sheet
@@ -90,12 +96,37 @@ def find_wrong_measurements(frames: Sequence[Frame], sensor: Sensor | None) -> F
     columns = list(zip(*map(_measured, frames), strict=True))
     return (
         _find_scaling(columns, sensor)
+        or find_short(frames, sensor)
         or _find_zero(columns)
-        or _find_frozen(columns)
         or (_find_unexpected(columns, sensor) if sensor is not None else None)
-        or _find_stuck(columns)
+        or _find_still(columns)
         or _find_floating(columns)
     )
+
+
+def find_short(frames: Sequence[Frame], sensor: Sensor | None) -> Finding | None:
+    """Say which wires are shorted, before anything else is made of the readings of a sensor, or of one without a scene.
+
+    A current that is cut off at full scale tells no resistance, and has no noise.
+    """
+    middles = [median_high(column) for column in zip(*map(_measured, frames), strict=True)]
+    full = 4095 if sensor is None else sensor.electronics.full_count
+    cut = [_RAIL_SHARE * full <= middles[k] <= full for k in (_TOUCH_AT, _RADIAL_AT, _ANGULAR_AT)]
+    if all(cut):
+        return Cause.CURRENT_OFF.found("all three drive currents stand at full scale")
+    words = ""
+    if sensor is not None and min(middles[_SUPPLY_AT:]) > 0:
+        frame = UntouchedZero(sensor).take_off(frames[-1]._replace(**dict(zip(MEASURED, middles, strict=True))))
+        words, matrix = explain_frame(sensor, frame), FrameInversion(sensor).invert(frame[6:18])
+        if matrix is not None and matrix.conductance > _SHORT_SIEMENS:
+            off = max(abs(matrix.split), *(min(abs(part), abs(part - 1.0)) for part in (matrix.x, matrix.y)))
+            if off < _CORNER:
+                words = f"{'BA'[round(matrix.x)]} joined with {'DC'[round(matrix.y)]}"
+    if any(cut):
+        words = words or ("A or B joined to ground" if cut[0] else "")
+        words = words or (Fault.SHORT_UPPER if cut[1] else Fault.SHORT_LOWER).value
+        return Cause.SHORT.found(f"a short, a drive current stands at full scale: {words}")
+    return Cause.SHORT.found(f"a short: {words}") if "joined" in words or "stuck" in words else None
 
 
 _Columns = Sequence[Sequence[int]]
@@ -137,18 +168,15 @@ def _find_zero(columns: _Columns) -> Finding | None:
     return cause.found(f"the drive current of the {'radial' if radial else 'angular'} phase {reads}")
 
 
-def _find_frozen(columns: _Columns) -> Finding | None:
-    if len(columns[0]) < _STUCK_FRAMES or any(len({*column[-_STUCK_FRAMES:]}) > 1 for column in columns):
-        return None
-    return Cause.COUNTS_STUCK.found(f"no reading has changed in {_STUCK_FRAMES} frames")
-
-
-def _find_stuck(columns: _Columns) -> Finding | None:
-    """Find a reading without noise: each of those that the detector's STUCK looks at must have some."""
+def _find_still(columns: _Columns) -> Finding | None:
+    """Find readings without noise: each of those that the detector's STUCK looks at must have some."""
     if len(columns[0]) < _STUCK_FRAMES:
         return None
-    for k in (_RADIAL_AT, _ANGULAR_AT, _SUPPLY_AT, _SUPPLY_AT + 1, _SUPPLY_AT + 2):
-        if len({*columns[k][-_STUCK_FRAMES:]}) == 1:
+    still = [k for k, column in enumerate(columns) if len({*column[-_STUCK_FRAMES:]}) == 1]
+    if len(still) == len(columns):
+        return Cause.COUNTS_STUCK.found(f"no reading has changed in {_STUCK_FRAMES} frames")
+    for k in still:
+        if k in (_RADIAL_AT, _ANGULAR_AT) or k >= _SUPPLY_AT:
             return Cause.NO_NOISE.found(f"{MEASURED[k]} has not changed in {_STUCK_FRAMES} frames")
     return None
 

@@ -17,8 +17,8 @@ class Fault(Enum):
     OPEN_LOWER = "no drive current between C and D: the wire of C or of D is open, or fed from elsewhere"
     OPEN_C = "no drive current between C and D: the wire of C is open, or fed from elsewhere"
     OPEN_D = "no drive current between C and D: the wire of D is open, or fed from elsewhere"
-    SHORT_UPPER = "too much drive current in the radial phase: A and B are shorted, or the positive one to ground"
-    SHORT_LOWER = "too much drive current in the angular phase: C and D are shorted, or the positive one to ground"
+    SHORT_UPPER = "too much drive current in the radial phase: A and B are shorted, or one of them to ground or supply"
+    SHORT_LOWER = "too much drive current in the angular phase: C and D are shorted, or one of them to ground or supply"
     SATURATED = "a guide stands at the converter's full scale: an input is shorted to the supply or stuck"
     LEAK = (
         "the drive current of the touch phase is not what flows through the pull-downs: an electrode is shorted to "

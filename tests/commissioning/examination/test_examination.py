@@ -15,6 +15,8 @@ from coneskin.skin.detection.events import SkinFault, TouchMoved
 from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.electronics import Polarity
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.circuit import WiringFaults
+from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.memory_source import MemorySource
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -196,8 +198,30 @@ def test_another_sheet_resistance_is_named_with_what_to_write() -> None:
     assert found.verdict == "warning"
     assert "write upper_sheet_ohm = 14" in found.remedy
     assert finding(examine(touches=False, wires="ACBD"), "skin, radial current").remedy == (
-        "no current: the wires of A and B are open, or on the electrodes of both sheets"
+        "the wire of A or B is open, shorted to the supply, or exchanged with one of the other sheet"
     )
+
+
+@pytest.mark.parametrize(
+    ("short", "said"),
+    [
+        (("A", "B"), "full scale: too much drive current in the radial phase: A and B are shorted"),
+        (("C", "D"), "full scale: too much drive current in the angular phase: C and D are shorted"),
+        (("B", "ground"), "full scale: A or B joined to ground"),
+        (("A", "ground"), "full scale: A joined to ground"),
+        (("D", "supply"), "D joined to the supply"),
+        *(((upper, lower), f"a short: {upper} joined with {lower}") for upper in "AB" for lower in "CD"),
+    ],
+)
+def test_a_short_from_the_start_is_named_and_nothing_is_made_of_its_readings(short: tuple[str, str], said: str) -> None:
+    doctor = examine(faults=FaultInjection(wiring=WiringFaults(shorts=(short,)), wiring_after=0))
+    assert said in finding(doctor, "skin, short").value
+    assert said in finding(doctor, "frames").value
+    assert finding(doctor, "skin, wires").verdict == "not tried"
+    told = " ".join(one.text for one in doctor.findings)
+    assert "sheet_ohm" not in told
+    assert "stuck_frames" not in told
+    assert "without a current" not in told
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,8 @@ from coneskin.robot.guard.activation import Activation, ActivationStep
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.types import Reaction
+from coneskin.skin.virtual.circuit import WiringFaults
+from coneskin.skin.virtual.fault_injection import FaultInjection
 from tests.support.guard_rig import GuardRig, touch
 
 
@@ -39,6 +41,12 @@ def test_it_refuses_to_arm_and_says_why(spoil, reason):
     rig.run(1.2)
     assert rig.core.phase is Phase.STARTING
     assert any(reason in line for line in rig.event("waiting").details["reasons"])
+
+
+def test_a_short_from_the_start_is_named_although_no_valid_frame_came():
+    shorted = FaultInjection(wiring=WiringFaults(shorts=(("A", "B"),)), wiring_after=0)
+    rig = GuardRig(faults=shorted).run(1.2)
+    assert any("one: no valid frame (too much drive" in line for line in rig.event("waiting").details["reasons"])
 
 
 def test_only_the_number_of_the_release_that_waits_is_its_acknowledgement():

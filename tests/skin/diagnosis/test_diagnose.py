@@ -13,10 +13,12 @@ from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.foreign_checksum import crc16
 from coneskin.skin.diagnosis.frame_numbers import measure_numbers
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.virtual.circuit import WiringFaults
+from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
-from coneskin.skin.wire import frame_at
+from coneskin.skin.wire import encode, frame_at
 
 from .corpus import BAUD, CLOCK_RATIOS, MISTAKES, NOT_TO_BE_NAMED, WITH_A_SCENE, build, bytes_of
 
@@ -95,7 +97,11 @@ def test_the_names_of_crcs_are_those_of_the_catalogue() -> None:
 
 def test_every_other_cause_is_in_the_corpus() -> None:
     rare = {Cause.FEW_BYTES, Cause.NIBBLES_SWAPPED, Cause.WORDS_SWAPPED, Cause.UBX, Cause.CRC_UNKNOWN}
-    rare |= {Cause.CLOCK_SECONDS, Cause.HELD_UP} | {Cause.SEQUENCE_RANDOM, Cause.SUPPLY_OFF, Cause.CURRENT_OFF}
+    rare |= {Cause.CLOCK_SECONDS, Cause.HELD_UP, Cause.SHORT} | {
+        Cause.SEQUENCE_RANDOM,
+        Cause.SUPPLY_OFF,
+        Cause.CURRENT_OFF,
+    }
     assert {*Cause} - {*MISTAKES.values()} - {*NOT_TO_BE_NAMED.values()} == rare
 
 
@@ -119,6 +125,28 @@ def test_a_skin_on_which_all_is_right_is_not_blamed(length: int, count: int, rat
     for scene in ((), sensors):
         named = diagnose(window.capture(1.2), scene, BAUD)
         assert named.verdict == "ok", named.line
+
+
+def test_a_current_at_full_scale_is_a_short_with_a_scene_and_without() -> None:
+    faults = FaultInjection(wiring=WiringFaults(shorts=(("A", "B"),)), wiring_after=0)
+    window = CaptureWindow(0.0)
+    for time, data in VirtualSkin(SENSOR, model="ladder", faults=faults, duration=0.4).packets():
+        window.feed(data, time)
+    for scene, said in (((), "A and B are shorted"), ((SENSOR,), "A joined with B")):
+        found = diagnose(window.capture(0.4), scene, None)
+        assert found.item == Cause.SHORT.key
+        assert said in found.value
+
+
+def test_all_currents_at_full_scale_are_the_boards() -> None:
+    skin = VirtualSkin(SENSOR, model="ladder", duration=0.4)
+    window = CaptureWindow(0.0)
+    for time, frame in skin.frames():
+        full = frame._replace(touch_current=4095, radial_current=4095, angular_current=4095)
+        window.feed(encode(full), time)
+    found = diagnose(window.capture(0.4), (SENSOR,), None)
+    assert found.item == Cause.CURRENT_OFF.key
+    assert "shunt" in found.remedy
 
 
 @pytest.mark.parametrize(("volts", "named"), [(0.0, False), (0.02, True)])

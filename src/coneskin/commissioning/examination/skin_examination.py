@@ -14,7 +14,7 @@ from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
-from coneskin.skin.diagnosis.measurements import MEASURED
+from coneskin.skin.diagnosis.measurements import MEASURED, find_short
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
 
 if TYPE_CHECKING:
@@ -131,8 +131,11 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
     name = sensor.name
     if len(seen.frames) < 20:
         return [Finding(f"{name}, rate", "bad", f"{len(seen.frames)} frames only", "200 Hz or more", "see `frames`")]
+    timing = _timing(name, seen, drift, silence)
+    if short := find_short(seen.frames, sensor):  # the other readings say no more, and would be taken for more
+        return [*timing, Finding(f"{name}, short", "bad", short.value, "no two wires are one", short.remedy)]
     return [
-        *_timing(name, seen, drift, silence),
+        *timing,
         *_levels(sensor, seen),
         *_noise(sensor, seen),
         *_currents(sensor, seen),
@@ -203,14 +206,14 @@ def _noise(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
 def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     parts, found = sensor.electronics, []
     for phase, wires, key, design, ohms, sheet in (
-        ("radial", "A and B", "upper_sheet_ohm", sensor.radial_amperes, sensor.radial_ohms, sensor.upper_sheet_ohms),
-        ("angular", "C and D", "lower_sheet_ohm", sensor.angular_amperes, sensor.angular_ohms, sensor.lower_sheet_ohms),
+        ("radial", "A or B", "upper_sheet_ohm", sensor.radial_amperes, sensor.radial_ohms, sensor.upper_sheet_ohms),
+        ("angular", "C or D", "lower_sheet_ohm", sensor.angular_amperes, sensor.angular_ohms, sensor.lower_sheet_ohms),
     ):
         measured = parts.amperes(statistics.fmean(seen.counts(f"{phase}_current")))
         off = max(measured / design, design / measured) if measured > 0.0 else math.inf
         verdict: Verdict = "ok" if off <= _NEAR_FACTOR else "warning" if off <= _FAR_FACTOR else "bad"
-        remedy = f"no current: the wires of {wires} are open, or on the electrodes of both sheets"
-        if measured >= 0.02 * design:
+        remedy = f"the wire of {wires} is open, shorted to the supply, or exchanged with one of the other sheet"
+        if measured >= 0.2 * design:
             own = sheet * (1.0 + parts.supply_volts * (1.0 / measured - 1.0 / design) / ohms)  # the leads stay
             remedy = f"if nothing is broken your layer has {own:.0f} ohm per square: write {key} = {own:.0f}"
         value, rule = f"{1e3 * measured:.3f} mA", f"the design's {1e3 * design:.3f} mA, within {_NEAR_FACTOR:g} times"
