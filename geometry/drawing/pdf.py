@@ -73,6 +73,8 @@ class _PdfWriter:
 _SIDE_MARGIN = 14.0  # mm; left and right margin of a page, for crop marks
 _TOP_MARGIN = 14.0  # mm; top margin of a page, for crop marks
 _BOTTOM_MARGIN = 24.0  # mm; bottom margin of a page, for crop marks and the scale bar
+_MARK_SIZE = 5.0  # mm; a longer line is no mark to touch
+_MARK_ROOM = 8.0  # mm; of a mark and its number from where pages join, so that no crosses meet
 _SAMPLE_STEP = 0.5e-3  # m; distance of points along strokes by which used pages are found
 
 
@@ -106,24 +108,44 @@ def _tile_pages(sheets: Sequence[CutSheet], width: float, height: float) -> _Pag
     """Spread sheets over pages of a size [mm], in portrait or landscape, whichever needs fewer pages."""
     x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
     extent = (x0 * 1e3, y0 * 1e3, x1 * 1e3, y1 * 1e3)
-    strokes = (stroke for sheet in sheets for part in sheet.parts for stroke in part.strokes)
+    strokes = [stroke for sheet in sheets for part in sheet.parts for stroke in part.strokes]
+    boxes = 1e3 * np.array([stroke.outline.bounds for stroke in strokes if stroke.kind == "score"]).reshape(-1, 2, 2)
+    marks = boxes[(boxes[:, 1] - boxes[:, 0]).max(axis=1) < _MARK_SIZE].mean(axis=1)
     segments = (segment for stroke in strokes for segment in stroke.outline.segments())
     points = 1e3 * np.concatenate([one.along(math.ceil(one.length / _SAMPLE_STEP)) for one in segments])
-    options = [_spread(points, extent, *size) for size in ((width, height), (height, width))]
+    options = [_spread(points, marks, extent, *size) for size in ((width, height), (height, width))]
     return min(options, key=lambda option: len(option.cells))
 
 
-def _spread(points: Floats, extent: tuple[float, float, float, float], width: float, height: float) -> _PageTiling:
+def _spread(
+    points: Floats, marks: Floats, extent: tuple[float, float, float, float], width: float, height: float
+) -> _PageTiling:
     x0, y0, x1, y1 = extent
     window_x, window_y = width - 2.0 * _SIDE_MARGIN, height - _TOP_MARGIN - _BOTTOM_MARGIN
     columns, rows = max(1, math.ceil((x1 - x0) / window_x)), max(1, math.ceil((y1 - y0) / window_y))
-    left = 0.5 * (x0 + x1 - columns * window_x)
-    bottom = 0.5 * (y0 + y1 - rows * window_y)
+    left = _clear_start(marks[:, 0], (x0, x1), columns, window_x)
+    bottom = _clear_start(marks[:, 1], (y0, y1), rows, window_y)
     places = (points - (left, bottom)) / (window_x, window_y)
     column, row = np.minimum(places.astype(int), (columns - 1, rows - 1)).T
     seen = {divmod(int(cell), rows) for cell in np.unique(column * rows + row)}
     cells = tuple(sorted(seen, key=lambda cell: (-cell[1], cell[0])))
     return _PageTiling(width, height, (columns, rows), (left, bottom), extent, cells)
+
+
+def _clear_start(marks: Floats, extent: tuple[float, float], count: int, step: float) -> float:
+    """Return where the first of some windows begins: at the middle of a drawing, or beside, where no join meets marks.
+
+    Args:
+        marks: coordinates of the marks [mm], shape (n,).
+        extent: least and largest coordinate of the drawing [mm].
+        count: windows.
+        step: size of a window [mm].
+    """
+    slack = count * step - (extent[1] - extent[0])
+    start = extent[0] - 0.5 * slack
+    shifts = sorted(slack * np.linspace(-0.5, 0.5, 41), key=abs)
+    away = [np.abs((marks - start - shift + 0.5 * step) % step - 0.5 * step) for shift in shifts]
+    return start + float(shifts[int(np.argmin([(near < _MARK_ROOM).sum() for near in away]))])
 
 
 PageSize = Literal["A4", "A3", "Letter"]
@@ -275,9 +297,9 @@ def _crop_marks(left: float, bottom: float, width: float, height: float) -> Iter
 
 
 def _registration(x: float, y: float) -> Iterator[str]:
-    """Yield a cross in a ring on the border of two windows; half of it is on each page."""
-    yield _line(x - 3.0, y, x + 3.0, y)
-    yield _line(x, y - 3.0, x, y + 3.0)
+    """Yield a slanted cross in a ring, unlike a mark to touch, on the border of two windows: half is on each page."""
+    yield _line(x - 2.5, y - 2.5, x + 2.5, y + 2.5)
+    yield _line(x - 2.5, y + 2.5, x + 2.5, y - 2.5)
     yield from _path(circle_outline(1e-3 * x, 1e-3 * y, 2e-3))
 
 

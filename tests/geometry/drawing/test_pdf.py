@@ -13,7 +13,7 @@ from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.outline import Outline
-from coneskin.geometry.drawing.pdf import to_pdf
+from coneskin.geometry.drawing.pdf import _tile_pages, to_pdf
 from coneskin.geometry.frustum import Frustum
 from tests.support.sweep import sweep
 
@@ -53,6 +53,25 @@ def project(curve, point):
         else:
             low += third
     return 0.5 * (low + high)
+
+
+@pytest.mark.parametrize("wrap", [1.2, 2.0 * np.pi])
+def test_no_mark_to_touch_lies_where_pages_join(wrap):
+    cover = cut_sheets(lay_out_sheet(Frustum(0.05, 0.05, 0.3, wrap)), PAPER_STACK)[6]
+    tiling = _tile_pages([cover], 210.0, 297.0)
+    assert len(tiling.cells) > 1
+    boxes = 1e3 * np.array([s.outline.bounds for part in cover.parts for s in part.strokes if s.kind == "score"])
+    marks = [box for box in boxes.reshape(-1, 2, 2) if np.ptp(box, axis=0).max() < 5.0]
+    assert len(marks) == 18, "two lines of each cross"
+    for mark in marks:
+        for at, origin, step, count in zip(mark.mean(axis=0), tiling.origin, tiling.window, tiling.counts, strict=True):
+            joins = origin + step * np.arange(1, count)
+            assert np.all(np.abs(joins - at) >= 8.0)
+    for low, high, origin, step, count in zip(
+        tiling.extent[:2], tiling.extent[2:], tiling.origin, tiling.window, tiling.counts, strict=True
+    ):
+        assert origin <= low + 1e-9
+        assert high <= origin + step * count + 1e-9
 
 
 def test_layers_are_optional_content_and_printing_is_not_scaled():
