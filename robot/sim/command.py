@@ -24,7 +24,7 @@ from pathlib import Path
 
 from coneskin.core.channel import Channel
 from coneskin.core.errors import ConeSkinError, RobotRefused
-from coneskin.core.files import explain_os_error, read_file
+from coneskin.core.files import explain_os_error, read_text
 from coneskin.core.help_text import HelpFormatter
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
 from coneskin.robot.sim.urscript.translator import MAX_LENGTH
@@ -190,10 +190,7 @@ def _address(text: str) -> tuple[str, int]:
 
 
 def _read(path: Path) -> str:
-    try:
-        return read_file(path, MAX_LENGTH).decode()
-    except (OSError, UnicodeDecodeError) as exc:
-        raise RobotRefused(f"--program {path} cannot be read: {exc}") from exc
+    return read_text(path, MAX_LENGTH, "a URScript text", lambda why: RobotRefused(f"--program {path}: {why}"))
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from coneskin.core.errors import SensorError, SkinConnectionError
-from coneskin.core.files import explain_os_error, read_file
+from coneskin.core.files import explain_os_error, read_text
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
@@ -279,12 +279,9 @@ def _read_script(path: Path) -> list[tuple[str, ScriptedTouch]]:
     Raises:
         SensorError: a line is no touch, or the file cannot be read; the message names the line.
     """
-    try:
-        lines = read_file(path, _MAX_SCRIPT).decode("utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise SensorError(f"{path}: cannot be read as a script of touches ({error})") from error
+    script = read_text(path, _MAX_SCRIPT, "a script of touches", lambda why: SensorError(f"{path}: {why}"))
     presses = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(script.splitlines(), 1):
         if text := line.partition("#")[0].strip():
             try:
                 presses.append(_parse_press(text))

@@ -162,9 +162,6 @@ class _Draft:
         self.write(stem.with_name(f"{stem.name}.dxf"), to_dxf(sheets, options.arcs, options.tolerance))
         self.write(stem.with_name(f"{stem.name}.svg"), to_svg(sheets, title))
 
-    def write_bed(self, bed: MaterialBed, options: FileOptions) -> None:
-        self.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, options)
-
 
 def _measured(sheets: tuple[SheetDesign, ...], mesh: Mesh | None, frame: str, first: int) -> list[BuildFigures]:
     """Return the figures for building the sheets of a link, the first of which has that number as a sensor."""
@@ -271,7 +268,7 @@ def write_design(
                 write_step(draft.place(place / "wrapped.step"), _wrapped_layers(design))
         for bed in beds:
             progress(f"writing {bed.slug}")
-            draft.write_bed(bed, options)
+            draft.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, options)
         rows = material_rows(sheets)
         table = io.StringIO()
         writer = csv.DictWriter(table, rows[0], lineterminator="\n")

@@ -351,7 +351,7 @@ def _write_robot(
     named = [dataclasses.replace(one.sheet, name=f"{one.link} {one.sheet.name}") for one in built]
     beds, larger = _nested(named, files)
     for bed in beds:
-        draft.write_bed(bed, files)
+        draft.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, files)
     head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
     rows = []
     for count, one in enumerate(design.offered, 1):

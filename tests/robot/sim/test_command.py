@@ -182,7 +182,7 @@ def test_a_taken_port_is_one_line_that_names_it(capfd: pytest.CaptureFixture[str
         (["--start-delay-ms", "-1"], "--start-delay-ms must be from 0 to 60000, got -1"),
         (["--unlock-after-s", "nan"], "--unlock-after-s must be from 0 to 3600, got nan"),
         (["--log", "/nowhere/at/all"], "--log /nowhere/at/all cannot be written"),
-        (["--program", "/nowhere/at/all"], "--program /nowhere/at/all cannot be read"),
+        (["--program", "/nowhere/at/all"], "--program /nowhere/at/all: the file cannot be read"),
         (["--programs", "/nowhere/at/all"], "--programs must be a folder, got /nowhere/at/all"),
         (["--external-control", "here"], "--external-control must be HOST:PORT such as 127.0.0.1:50002, got 'here'"),
         (["--external-control", "a:70000"], "--external-control must be HOST:PORT such as 127.0.0.1:50002"),

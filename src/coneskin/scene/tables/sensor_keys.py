@@ -11,26 +11,19 @@ from dataclasses import replace
 
 from coneskin.core.keys import Key, with_meanings
 
-_RADIUS1_KEY = Key("radius1_mm", low=1.0, high=5000.0, meaning="radius at end 1, the arc of electrode B")
-_RADIUS2_KEY = Key("radius2_mm", low=1.0, high=5000.0, meaning="radius at end 2, the arc of electrode A")
-_HEIGHT_KEY = Key(
-    "height_mm",
-    low=1.0,
-    high=10_000.0,
-    or_zero=True,
-    meaning="distance between the ends along the axis, 0 for a flat ring",
-)
-_WRAP_KEY = Key(
-    "wrap_deg",
-    default=2.0 * math.pi,
-    low=0.0,
-    high=360.0,
-    above=True,
-    meaning="angle covered about the axis, from electrode D (phi = 0) to C",
-)
-
 #: the active cone of a sensor, in a scene and in a sensor file; a sensor cannot reach an apex
-CONE_KEYS = (_RADIUS1_KEY, _RADIUS2_KEY, _HEIGHT_KEY, _WRAP_KEY)
+CONE_KEYS = _RADIUS1_KEY, _RADIUS2_KEY, _HEIGHT_KEY, _WRAP_KEY = with_meanings(
+    """
+    radius1_mm: radius at end 1, the arc of electrode B
+    radius2_mm: radius at end 2, the arc of electrode A
+    height_mm: distance between the ends along the axis, 0 for a flat ring
+    wrap_deg: angle covered about the axis, from electrode D (phi = 0) to C
+    """,
+    Key("radius1_mm", low=1.0, high=5000.0),
+    Key("radius2_mm", low=1.0, high=5000.0),
+    Key("height_mm", low=1.0, high=10_000.0, or_zero=True),
+    Key("wrap_deg", default=2.0 * math.pi, low=0.0, high=360.0, above=True),
+)
 #: the side of a link, on the command line; a radius of 0 is an apex
 LINK_CONE_KEYS = (
     replace(_RADIUS1_KEY, or_zero=True, meaning="radius at end 1"),
