@@ -17,14 +17,14 @@ from .axis_cases import AXIS, BASE, hull, off
 @pytest.mark.parametrize(
     ("body", "tilt", "shift"),
     [
-        # design note: 0.015 to 0.03 deg; 0.02 to 0.18 mm by where on the facets the samples lie
-        (rugby(), 0.01, 0.15),
+        # design note: 0.015 to 0.03 deg and 0.04 to 0.08 mm on such bodies
+        (rugby(), 0.01, 0.08),
         (barrel(), 0.05, 0.15),
-        (revolve([(0.0, 0.04), (0.1, 0.07), (0.13, 0.05), (0.3, 0.045)], rings=12), 0.01, 0.15),
+        (revolve([(0.0, 0.04), (0.1, 0.07), (0.13, 0.05), (0.3, 0.045)], rings=12), 0.01, 0.08),
     ],
 )
 def test_the_revolution_axis_needs_no_profile(body: tuple[Floats, Indices], tilt: float, shift: float) -> None:
-    line = _find_revolution_axis(hull(body))
+    line = _find_revolution_axis(hull(body, 48_000))  # on flat facets 6000 leave up to 0.25 mm, by where they lie
     assert line is not None
     found = off(*line)
     assert found[0] < tilt
