@@ -265,14 +265,17 @@ class GuardLoop:
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
         if now - before > _OVERRUN_TIME or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)
+        stopping, skin = self._core.phase.stopping, ports.source if ready & _SKIN or self._blind else None
+        if skin is not None and not stopping:
+            self._read_skin(skin)
         if self._epolls and (not ready or now >= self._look_at):
             self._look_at = now + _LOOK_PERIOD
             ready |= self._bits_of(number for number, _ in self._epolls[0].poll(0, _MAX_READY))
-        if ready & _READER and self._core.phase.stopping:  # states that wait may show that the stop under way works
+        if ready & _READER and stopping:  # states that wait may show that the stop under way works
             self._read(ports.reader, "controller", BlockKind.ARM)
             ready &= ~_READER
-        if ports.source is not None and (ready & _SKIN or self._blind):
-            self._read_skin(ports.source)
+        if skin is not None and stopping:
+            self._read_skin(skin)
         if ready & ~_SKIN:
             self._read_others(ready)
         if self._gone is not None and self._core.phase is Phase.LATCHED:
@@ -415,7 +418,7 @@ class GuardLoop:
     def _feed(self, kind: BlockKind, payload: bytes) -> None:
         """Feed the core, which sends its commands at once. Then record all of it."""
         self._fed = True
-        block = Block(kind, self._clock(), payload)
+        block = tuple.__new__(Block, (kind, self._clock(), payload))  # quicker than Block()
         outbox = self._outbox
         self._core.feed(block, outbox)
         self._record(block)
