@@ -15,9 +15,8 @@ from coneskin.core.errors import SensorError
 from .faults import Fault
 
 _LEARNING_FRAMES: Final = 16  # frames; from then on the period is known well enough to judge by
-_BACKLOG_TIME: Final = (
-    0.25  # s; in it what had piled up before the port was opened is read, and looks like a fast clock
-)
+# s; in it what had piled up before the port was opened is read, and looks like a fast clock
+_BACKLOG_TIME: Final = 0.25
 _RESTART_FRAMES: Final = 32  # frames; so many old ones in a row mean that the device has started anew
 
 

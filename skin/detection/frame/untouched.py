@@ -25,9 +25,8 @@ from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
 from .settings import DetectorSettings
 
-CURRENT_BLOCK: Final = (
-    32  # frames that are averaged at once; noise that lasts as long, as mains hum, shows in the means
-)
+# frames that are averaged at once; noise that lasts as long, as mains hum, shows in the means
+CURRENT_BLOCK: Final = 32
 _CURRENT_MEMORY: Final = 64  # blocks that the mean remembers
 _FREE_BLOCKS: Final = 8  # blocks in which it is found; from then on its drift is bounded
 _PRIOR_BLOCKS: Final = 16  # blocks that the noise taken from the start counts for
@@ -153,9 +152,8 @@ def bounded(step: float, most: float) -> float:
 _ZERO_LIMIT: Final = 0.012  # of full scale, that the zero may be off; 0.8 mV before an amplifier of 50, at 3.3 V
 _ZERO_STEP: Final = 1.0  # s, in which it is followed by a unit; by less it may be off: untouched readings end at 0
 _ZERO_TIME: Final = 0.5  # s of a look at one that is known: hum of 3 Hz and more goes up and down in it,
-_ZERO_TURN: Final = (
-    0.618  # of the time between two of its frames, by which the next is longer: mains stand still in none
-)
+# of the time between two of its frames, by which the next is longer: mains stand still in none
+_ZERO_TURN: Final = 0.618
 _ZERO_SPREAD: Final = 6.0  # units of the middle 80 %, more than the noise that most boards have
 
 
@@ -243,9 +241,8 @@ class UntouchedZero:
         )
 
 
-_GUIDE_JUMP: Final = (
-    0.01  # part of the supply; sudden potential of a guide, or difference of two, that nothing explains
-)
+# part of the supply; sudden potential of a guide, or difference of two, that nothing explains
+_GUIDE_JUMP: Final = 0.01
 _MAX_JUMP: Final = 0.03  # part of the supply; what noise raises that to at most
 _GUIDE_DEVIATIONS: Final = 7.0  # standard deviations of noise that are no potential
 _MAX_GUIDE_GROWTH: Final = 0.1  # parts of the supply a second; the fastest growth that is learned, a leak's

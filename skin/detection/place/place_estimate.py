@@ -24,25 +24,26 @@ thus has hardly any dipole, whatever its noise says, and a bonded one that of it
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, MatrixNoise
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sheet_functions import RobinFunction
 from coneskin.skin.tolerance import PlaceFloor
 
-_USUAL_RADIUS = math.log(0.005)  # ln m; radius of a usual contact, a fingertip's
-_WEIGHT_RADIUS = 1.0  # of ln a: one over its variance
-_MIN_RADIUS, _MAX_RADIUS = math.log(0.0005), math.log(0.03)  # ln m
-_WEIGHT_KA = 0.25 / 1.5**2  # of ln (ka)^2: a quarter over the variance of ln ka about 1
-_MAX_KA_WEIGHT = 6.0  # a bond has an infinite ka, and is no less usual than this says
-_LAST_NODE = 6
-_NODE_NUMBERS = range(_LAST_NODE + 1)
-_MIN_C = 0.003  # ka of 300: a bond
-_MIN_DISC_C = 0.25  # of the largest disc that is one contact; less has a ring of firm contacts, or a larger one
-_NODE_WIDTH = 0.35  # of the distance between a node's neighbours
-_MODEL_VARIANCE = 0.05**2  # of A^2; no real contact is a uniform disc
-_MODEL_RADIUS = 0.1  # of ln a; half the distance of two nodes, and the same
+_USUAL_RADIUS: Final = math.log(0.005)  # ln m; radius of a usual contact, a fingertip's
+_WEIGHT_RADIUS: Final = 1.0  # of ln a: one over its variance
+_MIN_RADIUS: Final = math.log(0.0005)  # ln m
+_MAX_RADIUS: Final = math.log(0.03)  # ln m
+_WEIGHT_KA: Final = 0.25 / 1.5**2  # of ln (ka)^2: a quarter over the variance of ln ka about 1
+_MAX_KA_WEIGHT: Final = 6.0  # a bond has an infinite ka, and is no less usual than this says
+_LAST_NODE: Final = 6
+_NODE_NUMBERS: Final = range(_LAST_NODE + 1)
+_MIN_C: Final = 0.003  # ka of 300: a bond
+_MIN_DISC_C: Final = 0.25  # of the largest disc that is one contact; less has a ring of firm contacts, or a larger one
+_NODE_WIDTH: Final = 0.35  # of the distance between a node's neighbours
+_MODEL_VARIANCE: Final = 0.05**2  # of A^2; no real contact is a uniform disc
+_MODEL_RADIUS: Final = 0.1  # of ln a; half the distance of two nodes, and the same
 
 
 class _DipoleStrength(NamedTuple):
@@ -145,13 +146,13 @@ def _posterior(
     )
 
 
-_REAL_VARIANCE = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
-_ROUND_INEQUALITY = 0.05  # of the dipole; inequality that an edge next to a round contact gives it
+_REAL_VARIANCE: Final = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
+_ROUND_INEQUALITY: Final = 0.05  # of the dipole; inequality that an edge next to a round contact gives it
 # what the multipoles beyond the dipole are, by the dipole's area: of the displacement, over the distance to the edge
 # squared; and of the taper, by its curvature squared (root mean squares of the difference to the exact field)
 _NEXT_IMAGE, _NEXT_TAPER = 0.02, 0.05
-_EDGE_MARGIN = 1e-4  # of a side; the edge itself has no gradient
-_MAX_STEP = 0.03  # of a side; a displacement is smaller, save of what is no contact
+_EDGE_MARGIN: Final = 1e-4  # of a side; the edge itself has no gradient
+_MAX_STEP: Final = 0.03  # of a side; a displacement is smaller, save of what is no contact
 
 
 class SheetConductances(NamedTuple):

@@ -15,6 +15,7 @@ one contact tells it from all that lies round it: no contact needs to be known b
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
 from coneskin.skin.detection.frame.settings import DetectorSettings
@@ -27,25 +28,24 @@ MOVES = "it has only begun, or moves"  #: the place is not that of the frame bef
 
 
 #: Azimuth by which a place may be off every contact [rad]: a motion along its normal goes away from them all.
-DANGEROUS_ANGLE = math.radians(20.0)
+DANGEROUS_ANGLE: Final = math.radians(20.0)
 
-_PAIR_DEVIATIONS = 3.0  # standard deviations of the averaged noise that may stand against the evidence
-_PAIR_FRAMES = 512  # frames; the average reaches back so far
-_LINE_DEVIATIONS = 4.0  # standard deviations of an inequality that is one
-_DISC_TOLERANCE = (
-    1.1  # ratio; a disc of 15 mm at an edge adds 1.04 times what the largest one may, contacts round it 1.17
-)
-_LARGEST_ANGLE = 1.3 * DANGEROUS_ANGLE  # of a radius: a disc this large adds less than contacts at DANGEROUS_ANGLE
+_PAIR_DEVIATIONS: Final = 3.0  # standard deviations of the averaged noise that may stand against the evidence
+_PAIR_FRAMES: Final = 512  # frames; the average reaches back so far
+_LINE_DEVIATIONS: Final = 4.0  # standard deviations of an inequality that is one
+# ratio; a disc of 15 mm at an edge adds 1.04 times what the largest one may, contacts round it 1.17
+_DISC_TOLERANCE = 1.1
+_LARGEST_ANGLE: Final = 1.3 * DANGEROUS_ANGLE  # of a radius: a larger disc adds less than contacts at that angle
 _ROUND_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm at an edge shows .07, two of 5 mm 20 mm apart 1.4
-_CERTAIN_SHARE = 0.9  # of the limit; what is not certain must fall below it to become so
+_CERTAIN_SHARE: Final = 0.9  # of the limit; what is not certain must fall below it to become so
 
-_CURRENTS_UNKNOWN = "the untouched drive currents are not known yet"
-_TOO_FEW_FRAMES = "too few frames yet to exclude a second contact"
+_CURRENTS_UNKNOWN: Final = "the untouched drive currents are not known yet"
+_TOO_FEW_FRAMES: Final = "too few frames yet to exclude a second contact"
 _SEVERAL_CONTACTS = (
     "the drive currents rise unequally, or the guides differ: several contacts, a long one, or a sheet that has changed"
 )
 _LARGE_CONTACT = "the drive currents rise more than by one contact: several round this place, or a very large one"
-_COARSE_READINGS = "the readings are too coarse to exclude a second contact so lightly touched"
+_COARSE_READINGS: Final = "the readings are too coarse to exclude a second contact so lightly touched"
 
 
 class SingleContactTest:

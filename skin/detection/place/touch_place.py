@@ -9,6 +9,7 @@ should be (``tolerance``): their part of the covariance does not fall with the n
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion, FrameNoise, MatrixNoise
 from coneskin.skin.detection.frame.reading import Reading, TouchReading
@@ -22,17 +23,17 @@ from .seam_contact import SeamCertainty, SeamPlace
 from .single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES, WEAK, SingleContactTest
 from .touch_filter import TouchFilter
 
-_FLOOR_FRAMES = 128  # frames; no estimate is made anew for more
-_HUM_QUARTER = 0.005  # s; of a period of 50 Hz, in which hum is alike
+_FLOOR_FRAMES: Final = 128  # frames; no estimate is made anew for more
+_HUM_QUARTER: Final = 0.005  # s; of a period of 50 Hz, in which hum is alike
 _NORMAL_DEVIATIONS = 3.0  # standard deviations within which the normal of a certain place is known to DANGEROUS_ANGLE
-_UNKNOWN_NORMAL = "its normal is not known to 20 degrees: calibrate the sensor"
+_UNKNOWN_NORMAL: Final = "its normal is not known to 20 degrees: calibrate the sensor"
 
 _MAX_SLIDE = 2.0  # settle distances; a touch that has moved this far is another one, and its evidence begins anew
 
-_REFRESH_RATIO = 1.25  # ratio of frames at which the estimate is made anew
-_REFRESH_FRAMES = 8  # frames for which an estimate serves at least; it costs as much as five of them
-_SOLVE_STEP = 0.1  # ratio by which the conductance may change before it is
-_UNLEARNED_ERROR = 0.05  # ratio; the sheets' conductance where none was learned yet
+_REFRESH_RATIO: Final = 1.25  # ratio of frames at which the estimate is made anew
+_REFRESH_FRAMES: Final = 8  # frames for which an estimate serves at least; it costs as much as five of them
+_SOLVE_STEP: Final = 0.1  # ratio by which the conductance may change before it is
+_UNLEARNED_ERROR: Final = 0.05  # ratio; the sheets' conductance where none was learned yet
 
 
 class TouchPlace:
@@ -162,7 +163,8 @@ class TouchPlace:
         )
 
     def _placed(self, x: float, y: float, estimate: PlaceEstimate | None) -> tuple[float, float]:
-        u, phi = self._estimator.place(x, y, *((0.0, 0.0) if estimate is None else (estimate.move_x, estimate.move_y)))
+        move_x, move_y = (0.0, 0.0) if estimate is None else (estimate.move_x, estimate.move_y)
+        u, phi = self._estimator.place(x, y, move_x, move_y)
         return (u, phi) if self._map is None else self._map.apply(u, phi)
 
     def _contacts(self, reading: Reading) -> ContactMatrix | None:

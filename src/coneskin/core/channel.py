@@ -21,15 +21,15 @@ import time
 import weakref
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 if TYPE_CHECKING:
     from _typeshed import HasFileno
 
-_LENGTH_FIELD = struct.Struct("<I")
-_MAX_LENGTH = 1 << 24  # bytes of one message
-_MAX_WAITING = 1 << 22  # bytes that the other side has not taken
-_BOUND_FACTOR = 2  # bounds; the second is for what is left of a shortened message
+_LENGTH_FIELD: Final = struct.Struct("<I")
+_MAX_LENGTH: Final = 1 << 24  # bytes of one message
+_MAX_WAITING: Final = 1 << 22  # bytes that the other side has not taken
+_BOUND_FACTOR: Final = 2  # bounds; the second is for what is left of a shortened message
 
 
 _Waited = TypeVar("_Waited", bound="HasFileno")

@@ -11,7 +11,7 @@ see ``chunk``. The writer gives the kinds their meaning: see ``robot.guard.journ
 from __future__ import annotations
 
 import struct
-from typing import NamedTuple, TypeGuard
+from typing import Final, NamedTuple, TypeGuard
 
 from coneskin.core.errors import RecordingError
 
@@ -20,9 +20,9 @@ COPY = 255  #: kind: a block that stands elsewhere as well: u8 its kind, f64 its
 DROPPED = 254  #: kind: JSON: what retention has dropped
 ALL_KINDS = frozenset(range(256))
 FILE_KINDS = frozenset({END, *range(240, 256)})  #: not for those who read a run
-_BLOCK_HEAD = struct.Struct("<IBd")
-_COPY_HEAD = struct.Struct("<Bd")
-MAX_PAYLOAD = 1 << 24  #: bytes; a longer block is damage, not data
+_BLOCK_HEAD: Final = struct.Struct("<IBd")
+_COPY_HEAD: Final = struct.Struct("<Bd")
+MAX_PAYLOAD: Final = 1 << 24  #: bytes; a longer block is damage, not data
 
 
 class Block(NamedTuple):
