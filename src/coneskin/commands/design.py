@@ -57,9 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "coneskin design [LINK] -o DIR [options]"
     add = parser.add_argument
     add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
-    add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create")
+    add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create; --force replaces one")
     add("--force", action="store_true", help="replace an earlier design in that folder")
-    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): the sheets that N wires allow")
+    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): as many sheets as N wires allow, 4 each")
     add("--json", action="store_true", help="print the design as JSON")
     add("--no-pictures", action="store_true", help="write the report without pictures")
     add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--simulated", action="store_true", help="a simulated arm and a virtual skin, which is touched in the motion")
     add("--arm", metavar="MODEL", help=f"model of the arm, such as UR10e; with --simulated {DEFAULT_MODEL} by default")
     add("--host", metavar="ADDRESS", help=f"of the controller; with --simulated {_SIMULATED_HOST} by default")
-    help_text = "serial port of the skin, such as /dev/ttyUSB0; may be repeated"
+    help_text = "serial port of a board, such as /dev/ttyUSB0: once for each sheet, in the order of their numbers"
     add("--port", metavar="PORT", action="append", default=[], help=help_text)
     add("--board", choices=list(boards()), help="board of `coneskin firmware`: the scene says its values")
     add("--converter", choices=[BUILT_IN, *converters()], default=BUILT_IN, help="of the board (default: %(default)s)")
