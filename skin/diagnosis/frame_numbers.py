@@ -18,6 +18,7 @@ _MIN_FRAMES = 8
 _STEADY_SHARE = 0.9  # of the steps that must be of one kind
 _MIN_RATE = 100.0  # Hz
 _CLOCK_TOLERANCE = 0.015  # of its speed; a ceramic resonator is off by 0.005
+_UNEVEN = 0.005  # of it, between two parts of the time
 _HELD_BACK = 0.012  # s from one group of frames to the next, where the frames themselves are closer
 _HELD_UP = 0.03  # s of frames that are read at once: no adapter's latency timer is as long
 _LOST_SHARE = 0.02  # share of frames
@@ -38,7 +39,7 @@ class FrameNumbers:
         missing: share of the sequence numbers that never came.
         period: device time from frame to frame, the middle one [s].
         held_up: for how long this computer has left frames unread, by those that it then read at once [s].
-        hidden: it was held up for so long that the ratio of the clocks may be 1.
+        hidden: it was held up for so long, or so often, that the ratio of the clocks may be 1.
     """
 
     rate: float
@@ -62,9 +63,9 @@ def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNum
     forward = [step for step in steps if 0 < step < 0x8000]
     missing = sum(step - 1 for step in forward) / max(1, sum(forward))
     middle = median_high(ticks) * 1e-6 if ticks else 0.0
-    ratio = _slope(ticks, times) if seconds >= _MIN_TIME else math.nan
+    ratio, uneven = _slope(ticks, times) if seconds >= _MIN_TIME else (math.nan, False)
     held = _held_up(ticks, times)
-    hidden = held > 0.5 * seconds or abs(ratio - 1.0) * (seconds - held) <= held
+    hidden = uneven or held > 0.5 * seconds or abs(ratio - 1.0) * (seconds - held) <= held
     return FrameNumbers(rate, ratio, missing, middle, held, hidden)
 
 
@@ -89,23 +90,28 @@ def _clock_steps(frames: Sequence[Frame]) -> list[int]:
     return [((b.clock_us - a.clock_us + 0x80000000) & 0xFFFFFFFF) - 0x80000000 for a, b in itertools.pairwise(frames)]
 
 
-def _slope(ticks: Sequence[int], times: Sequence[float]) -> float:
-    """Return the speed of the device's clock over that of the host.
+def _slope(ticks: Sequence[int], times: Sequence[float]) -> tuple[float, bool]:
+    """Return the speed of the device's clock over that of the host, and whether parts of the time contradict it.
 
     A frame comes late, never early, and a computer that is held up reads frames late for a while: they fall behind at
     once, and stay or come back. Clocks of two speeds move apart all the time. So a first line by least squares is
-    turned to the middle one of the steps between the quickest frames of each part of the time.
+    turned to the middle one of the steps between the quickest frames of each part of the time; where two of them show
+    no such speed, it is the frames of these parts that are late.
     """
     clocks = list(itertools.accumulate(ticks, initial=0))
     count, slope = len(times), linear_regression(times, clocks).slope
+    steps: list[float] = []
     edges = [count * part // _TIME_PARTS for part in range(_TIME_PARTS + 1)]
     for _ in range(_LINE_TURNS if count >= _TIME_PARTS * _MIN_FRAMES else 0):
         if not slope > 0.0:
             break
         lag = [time - clock / slope for time, clock in zip(times, clocks, strict=True)]
         quickest = itertools.pairwise(min(range(a, b), key=lag.__getitem__) for a, b in itertools.pairwise(edges))
-        slope = median_high((clocks[b] - clocks[a]) / max(times[b] - times[a], 1e-6) for a, b in quickest)
-    return slope * 1e-6
+        steps = sorted((clocks[b] - clocks[a]) / max(times[b] - times[a], 1e-6) for a, b in quickest)
+        slope = median_high(steps)
+    second = steps[1 if slope > 1e6 else -2] if steps else slope
+    apart, off = 1e-6 * abs(slope - second), math.copysign(1e-6, slope - 1e6) * (second - 1e6)
+    return 1e-6 * slope, apart > _UNEVEN and off < _CLOCK_TOLERANCE
 
 
 def find_wrong_numbers(frames: Sequence[Frame], times: Sequence[float], sensors: int) -> Finding | None:
@@ -175,8 +181,8 @@ def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Finding | Non
             return cause.found(f"the device's clock counts {unit}")
     if abs(ratio - 1.0) > _CLOCK_TOLERANCE:
         if numbers.hidden:
-            held = f"{1e3 * numbers.held_up:.0f} ms"
-            return Cause.HELD_UP.found(f"this computer held frames up for {held}, which hides the clock")
+            held = f"{1e3 * numbers.held_up:.0f} ms of them at once"
+            return Cause.HELD_UP.found(f"this computer held frames up, {held}, which hides the clock")
         return Cause.CLOCK_RATIO.found(f"the device's clock runs {ratio:.3f} times as fast as the computer's")
     period = 1e6 * numbers.period
     steps = zip(_sequence_steps(frames), ticks, strict=True)
