@@ -166,7 +166,7 @@ def test_a_clock_that_a_busy_computer_cannot_judge_is_no_fault_of_the_firmware()
         for time, frame in VirtualSkin(parse_scene(TEXT).sensors[0].sensor, duration=3.0, model="ladder").frames():
             seen.frames.append(frame)
             seen.times.append(max(time + step * (time > 1.5), 3.0 if time > 3.0 - held else 0.0))
-        (found,) = (one for one in _timing("skin", seen, 0.0, 0.05) if one.item == "skin, clock")
+        (found,) = (one for one in _timing("skin", seen, 0.0, 0.05, 200.0) if one.item == "skin, clock")
         return found
 
     assert clock(0.0).verdict == "ok"
@@ -188,7 +188,7 @@ def test_a_clock_is_blamed_where_it_is_wrong_however_often_a_busy_computer_is_la
                 late, until = jitter.uniform(0.0, 0.03), time + jitter.uniform(0.1, 0.33)
             seen.frames.append(frame)
             seen.times.append(max(time + late, seen.times[-1] + 1e-4 if seen.times else 0.0))
-        verdicts.update(one.verdict for one in _timing("skin", seen, 0.0, 0.05) if one.item == "skin, clock")
+        verdicts.update(one.verdict for one in _timing("skin", seen, 0.0, 0.05, 200.0) if one.item == "skin, clock")
     assert ("bad" in verdicts) == (ratio != 1.0)
 
 
@@ -200,6 +200,13 @@ def test_a_low_rate_for_which_the_scene_is_made_is_a_warning() -> None:
         examine(touches=False, rate_hz=199.0), "skin, rate"
     )  # of a board whose clock is half a per cent off
     assert usual.verdict == "ok"
+
+
+def test_the_rate_that_the_scene_gives_a_virtual_skin_is_the_one_that_is_wanted() -> None:
+    virtual = TEXT.replace('kind = "serial"\nport = "/dev/nothing"\nbaud = 115200', 'kind = "virtual"\nrate_hz = 100')
+    found = finding(examine(virtual, touches=False, rate_hz=100.0), "skin, rate")
+    assert (found.verdict, found.rule) == ("ok", "100 to 1000")
+    assert finding(examine(virtual, touches=False, rate_hz=90.0), "skin, rate").verdict == "warning"
 
 
 def test_frames_of_touches_are_held_against_themselves() -> None:

@@ -6,13 +6,14 @@ Nothing is moved, and nothing is guarded.
 from __future__ import annotations
 
 import difflib
+import math
 import os
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from coneskin.commissioning.skin_watch import skin_source
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
@@ -122,7 +123,7 @@ class Doctor:
             except SkinConnectionError as exc:
                 self.note(Finding("skin, port", "bad", str(exc), "it stays open", "look at the plug and the cable"))
 
-    def examine_skin(self, source: Source, settings: Mapping[str, object], toucher: SkinClient | None = None) -> None:
+    def examine_skin(self, source: Source, settings: Mapping[str, Any], toucher: SkinClient | None = None) -> None:
         """Examine what an open source sends, untouched and touched.
 
         Args:
@@ -138,13 +139,13 @@ class Doctor:
         _collect(source, _START_TIME, self._clock)  # a device that starts with its port, and what has piled up
         seen = _collect(source, _LISTEN_TIME, self._clock)
         self.note(*examine_line(seen, sensors, settings, self._clock()))
-        limits = self.scene.monitoring_limits
+        limits, rate = self.scene.monitoring_limits, settings.get("rate", math.inf)  # a virtual skin's is the scene's
         for sensor in sensors:
             statistics = seen.sensors.get((sensor.device_id, sensor.sensor_id))
             if statistics is None:
                 self.note(Finding(f"{sensor.name}, wires", "not tried", "it sends nothing"))
                 continue
-            self.note(*examine_sensor(sensor, statistics, limits.clock_drift, limits.skin_silence))
+            self.note(*examine_sensor(sensor, statistics, limits.clock_drift, limits.skin_silence, rate))
             if self.findings[-1].item.endswith(", short"):
                 self.note(Finding(f"{sensor.name}, wires", "not tried", "a short hides what touches would tell"))
                 continue

@@ -119,7 +119,9 @@ def examine_line(
     return found
 
 
-def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
+def examine_sensor(
+    sensor: Sensor, seen: SensorStatistics, drift: float, silence: float, rate: float = math.inf
+) -> list[Finding]:
     """Examine one untouched sensor.
 
     Args:
@@ -127,11 +129,12 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
         seen: its frames, of a few seconds.
         drift: that the scene allows the device's clock, a part of the time.
         silence: after which the scene takes the skin for silent [s].
+        rate: of frames, where the scene says it [Hz].
     """
     name = sensor.name
     if len(seen.frames) < 20:
         return [Finding(f"{name}, rate", "bad", f"{len(seen.frames)} frames only", "200 Hz or more", "see `frames`")]
-    timing = _timing(name, seen, drift, silence)
+    timing = _timing(name, seen, drift, silence, min(max(rate, _LOW_RATE), _GOOD_RATE))
     if short := find_short(seen.frames, sensor):  # the other readings say no more, and would be taken for more
         return [*timing, Finding(f"{name}, short", "bad", short.value, "no two wires are one", short.remedy)]
     return [
@@ -143,14 +146,14 @@ def examine_sensor(sensor: Sensor, seen: SensorStatistics, drift: float, silence
     ]
 
 
-def _timing(name: str, seen: SensorStatistics, drift: float, silence: float) -> list[Finding]:
+def _timing(name: str, seen: SensorStatistics, drift: float, silence: float, wanted: float) -> list[Finding]:
     numbers = seen.numbers()
     rate, ratio = numbers.rate, numbers.clock_ratio
     enough = rate >= _LOW_RATE or rate * silence >= _FRAMES_PER_SILENCE
-    good = rate >= (1.0 - max(_CLOCK_ERROR, drift)) * _GOOD_RATE  # as well as the device's clock knows it
-    verdict: Verdict = "ok" if good else "warning" if enough else "bad"
+    good = rate >= (1.0 - max(_CLOCK_ERROR, drift)) * wanted  # as well as the device's clock knows it
+    verdict: Verdict = "bad" if not enough else "ok" if good else "warning"
     remedy = "shorten the settling, raise the baud rate, or raise monitoring.skin_silence_ms"
-    found = [judged(f"{name}, rate", verdict, f"{rate:.0f} frames/s", "200 to 1000", remedy)]
+    found = [judged(f"{name}, rate", verdict, f"{rate:.0f} frames/s", f"{wanted:.0f} to 1000", remedy)]
     remedy = "the line is too slow or disturbed, or this computer too busy"
     value = f"{100.0 * numbers.missing:.1f} % of the frames"
     found.append(judged(f"{name}, lost", numbers.missing <= _MAX_LOST, value, "at most 2 %", remedy))
