@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from coneskin.commissioning.calibration.calibrate import CalibrationResult
 
 _DEFAULT_FOLDER = "calibrations"
+_UNEVEN_MM = 2.0  # rms of what a map leaves of a touch; of a film of its class it is 0.7, and 1.2 with four marks
 #: of a calibration, in the JSON object of its result
 _SHOWN_FIELDS = (
     *("before_rms_mm", "after_rms_mm", "before_largest_mm", "after_largest_mm", "map_error_mm"),
@@ -132,12 +133,22 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         return
     used = sum(touch.used for touch in record.touches)
     leads = ", ".join(f"{letter} {ohm:+.1f}" for letter, ohm in zip("ABCD", record.extra_ohm, strict=True))
+    leads += " ohm more than lead_ohm, if it is leads"
+    if any(
+        ohm + own < 0.0 for ohm, own in zip(record.extra_ohm, result.touches.sensor.electronics.lead_ohms, strict=True)
+    ):
+        leads = "it is not leads alone: one would have less than 0 ohm"
     print(f"{name}: {len(record.touches)} touches, {used} used")
     print(f"  before      {record.before_rms_mm:.2f} mm (rms), {record.before_largest_mm:.2f} mm at most")
     print(
         f"  calibrated  {record.after_rms_mm:.2f} mm (rms), {record.after_largest_mm:.2f} mm at most, cross-validated; "
         "it holds how well the marks were placed and touched"
     )
+    if record.after_rms_mm > _UNEVEN_MM:
+        print(
+            f"  uneven      {_UNEVEN_MM:g} mm is much: the sheet is not uniform, or marks were missed. Take --marks 16,"
+        )
+        print('              write sheet_class = "coated", or build with another sheet, and calibrate again')
     print(
         f"  fitted      along: {record.fitted_along}; around: {record.fitted_around}; {record.map_error_mm:.2f} mm "
         "along and around each is left at other places (rms)"
@@ -146,7 +157,7 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         place = result.fit.next_mark
         more = "enough marks; one more" if result.fit.enough else "too few: touch one more,"
         print(f"  next        {more} at {1e3 * place.u:.0f} mm, {math.degrees(place.phi):.0f} deg would tell most")
-    print(f"  as leads    {leads} ohm more than lead_ohm, if it is leads")
+    print(f"  as leads    {leads}")
     print(f"  sheets      {record.sheet_ohm[0]:.0f} and {record.sheet_ohm[1]:.0f} ohm per square, by their currents")
     if record.forces_n:
         pairs = ", ".join(f"{n:g} N {x:.2f}" for n, x in zip(record.forces_n, record.force_levels, strict=True))

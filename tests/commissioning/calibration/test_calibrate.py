@@ -8,9 +8,11 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.calibrate import _forces
-from coneskin.scene.reader import load_scene
-from coneskin.scene.values.calibration_file import _read_calibrations
+from coneskin.commands.calibrate import _forces, _show
+from coneskin.commissioning.calibration.calibrate import CalibrationResult
+from coneskin.commissioning.calibration.touches import SensorTouches
+from coneskin.scene.reader import load_scene, parse_scene
+from coneskin.scene.values.calibration_file import CalibrationRecord, _read_calibrations
 from tests.support.scenes import forearm_scene
 
 TEXT = forearm_scene().replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"\nwrap_deg = 350\ndevice = 7')
@@ -103,6 +105,23 @@ def test_the_marks_are_listed_without_touching(tmp_path: Path, capsys: Output) -
 def test_what_cannot_be_touched_is_said(words: list[str], said: str, tmp_path: Path, capsys: Output) -> None:
     assert main(["calibrate", saved(tmp_path, "scene.toml", TEXT), *words]) == 1
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("after_mm", "lead", "uneven", "leads"), [(0.7, -0.9, False, True), (4.7, -7.1, True, False)])
+def test_an_uneven_sheet_is_said_with_what_to_do_and_has_no_lead_below_nothing(
+    after_mm: float, lead: float, uneven: bool, leads: bool, capsys: Output
+) -> None:
+    sensor = parse_scene(TEXT).sensors[0].sensor
+    words = {"sensor": 0, "name": "cuff", "date": "", "coneskin": "", "by": "", "simulated": True, "fingerprint": ""}
+    errors = {"before_rms_mm": 7.2, "before_largest_mm": 9.0, "after_rms_mm": after_mm, "after_largest_mm": 7.7}
+    numbers = {"map_along": (), "map_around": (), "fitted_along": "", "fitted_around": "", "map_error_mm": 1.0}
+    ohms = {"extra_ohm": (1.3, 11.1, 11.7, lead), "sheet_ohm": (996.0, 996.0), "touches": ()}
+    record = CalibrationRecord(**words, **errors, **numbers, **ohms)  # type: ignore[arg-type]
+    _show(CalibrationResult(SensorTouches(sensor, ()), None, record), None, False, False)
+    said = capsys.readouterr().out
+    assert ("--marks 16" in said and "sheet_class" in said) is uneven
+    assert (f"D {lead:+.1f} ohm more than lead_ohm" in said) is leads
+    assert ("less than 0 ohm" in said) is not leads
 
 
 def test_forces_are_two_or_more_that_a_gauge_can_show() -> None:
