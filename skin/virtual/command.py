@@ -20,6 +20,11 @@ example:
   coneskin sim-skin --fault drop_every=50 --fault wiring=open-A --fault wiring_after=3000
   Lose one frame in 50, and break the wire of A after 3000 frames.
 
+  coneskin sim-skin --link /tmp/skin --rate-hz 200 --fault wiring=short-A-B --fault wiring_after=0
+  A skin to try doctor, monitor and guard with, here with a short from the start. Its scene has kind = "serial" and
+  port = "/tmp/skin" in [source], and a sensor with radius1_mm = 54, radius2_mm = 54 and height_mm = 434. Touches of a
+  script begin when the port is opened and wait for no prompt; with --simulated, doctor and calibrate touch as they ask.
+
 Ctrl-C ends it. Exit code: 0 ended, or the file of --output is written; 1 an option is not possible; 2 wrong usage.
 """
 
@@ -46,14 +51,14 @@ from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import IDEAL_SHEETS, SHEET_CLASSES
 from coneskin.skin.wire import FRAME_LENGTH, FRAME_LENGTHS
 
-from .circuit import ContactModel, WiringFaults
+from .circuit import ContactModel, ConverterInputs, WiringFaults
 from .fault_injection import FaultInjection
 from .imperfections import Imperfections
 from .scripted_touch import TOUCH_SHAPES, ScriptedTouch
 from .skin import MODELS, VirtualSkin
 
 _MAX_SCRIPT = 1 << 20  # bytes of a script
-_FAULT_NAMES = tuple(f.name for f in fields(FaultInjection))
+_FAULT_KINDS = {f.name: type(f.default) for f in fields(FaultInjection)}  # int where it may be None
 # of the electronics, and of time
 _ELECTRIC_FLAWS = frozenset({"current_gain", "current_offset", "offset_counts", "mains_volts", "warming"})
 _FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(_ELECTRIC_FLAWS))
@@ -83,8 +88,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     help_text = "read touches from a file, one a line as --touch has them; # comments"
     add("--script", type=Path, metavar="FILE", help=help_text)
     help_text = (
-        f"inject a fault; may be repeated. Names: {', '.join(_FAULT_NAMES)}. *_every and *_after count frames; "
-        "wiring is open-A, short-A-B or short-A-ground (also -supply, -rail)"
+        f"inject a fault; may be repeated. Names: {', '.join(_FAULT_KINDS)}. *_every, *_after and *_frames count "
+        "frames, from 0; without its *_after a fault never comes. Values: wiring open-A, short-A-B or short-A-ground "
+        f"(also -supply, -rail); stuck_channel {', '.join(ConverterInputs._fields)}, supply or all; gain_of A, B, C, "
+        "D, current, supply or touch, whose readings gain (0 to 10) multiplies; saturate_count 0 to 65535; "
+        "clock_jump_us microseconds; status a number, whose bits are in docs/look-up/wire-format.md (1: supply)"
     )
     add("--fault", type=_argument(parse_fault), metavar="NAME=VALUE", help=help_text, **many)
     help_text = "the sheets: exact field, or ideal resistors (default field)"
@@ -336,16 +344,16 @@ def _parse_way(text: str) -> tuple[float, float]:
     return float(first), float(last if separator else first)
 
 
-def parse_fault(text: str) -> tuple[str, int | str | WiringFaults]:
+def parse_fault(text: str) -> tuple[str, float | str | WiringFaults]:
     """Read NAME=VALUE of one fault.
 
     Raises:
         SensorError: no fault has that name, or the value does not suit it.
     """
     name, _, value = text.partition("=")
-    if name not in _FAULT_NAMES:
-        raise SensorError(f"a fault must be one of {', '.join(_FAULT_NAMES)}, got {name!r}")
-    if name == "stuck_channel":
+    if name not in _FAULT_KINDS:
+        raise SensorError(f"a fault must be one of {', '.join(_FAULT_KINDS)}, got {name!r}")
+    if _FAULT_KINDS[name] is str:
         return name, value
     if name == "wiring":
         kind, *electrodes = value.split("-")
@@ -355,9 +363,9 @@ def parse_fault(text: str) -> tuple[str, int | str | WiringFaults]:
             return name, WiringFaults(shorts=((electrodes[0], electrodes[1]),))
         raise SensorError(f"wiring must be open-A or short-A-ground (or -supply, -rail, -B), got {value!r}")
     try:
-        return name, int(value, 0)
+        return name, float(value) if _FAULT_KINDS[name] is float else int(value, 0)
     except ValueError:
-        raise SensorError(f"fault {name} must be a whole number such as {name}=50, got {value!r}") from None
+        raise SensorError(f"fault {name} must be a number such as {name}=5, got {value!r}") from None
 
 
 def _parse_flaw(text: str) -> tuple[str, float]:

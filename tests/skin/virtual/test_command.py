@@ -18,6 +18,7 @@ from coneskin.skin.detection.stream import TouchStream
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.serial_port import SerialPort
 from coneskin.skin.virtual import command
+from coneskin.skin.virtual.fault_injection import FaultInjection
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import FrameDecoder
@@ -75,7 +76,7 @@ def test_a_touch_that_cannot_be(text):
     ("text", "words"),
     [
         ("warp=1", "a fault must be one of drop_every"),
-        ("drop_every=x", "fault drop_every must be a whole number such as drop_every=50, got 'x'"),
+        ("drop_every=x", "fault drop_every must be a number such as drop_every=5, got 'x'"),
         ("wiring=melt-A", "wiring must be open-A or short-A-ground"),
         ("wiring=open-E", "open wire must be one of A, B, C, D, got 'E'"),
     ],
@@ -85,12 +86,17 @@ def test_a_fault_that_cannot_be(text, words):
         command.parse_fault(text)
 
 
+def test_every_fault_takes_a_value_of_its_kind():
+    given = "gain_after=0", "gain_of=D", "gain=0.5", "status=0x08", "stuck_channel=radial_c", "wiring=short-A-rail"
+    faults = FaultInjection(**dict(map(command.parse_fault, given)))
+    assert (faults.gain_of, faults.gain, faults.status, faults.stuck_channel) == ("D", 0.5, 8, "radial_c")
+    assert faults.wiring.shorts == (("A", "rail"),)
+
+
 def test_a_file_holds_the_bytes_of_the_virtual_skin(tmp_path, capsys):
     file = tmp_path / "touch.bin"
     words = ["--touch", "0.01:0.03:50:90", "--fault", "drop_every=10", "--seed", "4", "--duration-s", "0.05"]
     assert run(*CONE, *words, "--output", str(file), "--json") == 0
-    from coneskin.skin.virtual.fault_injection import FaultInjection
-
     touch = ScriptedTouch(0.01, 0.03, 0.05, math.pi / 2)
     sensor = Sensor(Frustum(0.04, 0.07, 0.15, 2 * math.pi))
     skin = VirtualSkin(sensor, [touch], seed=4, faults=FaultInjection(drop_every=10), duration=0.05)
