@@ -286,6 +286,7 @@ class Detector:
         self._leak.feed(frame, whole)
         changed = self._currents.feed(frame, self.timing.period)
         if changed is not None:
+            self._places.altered |= changed[0] is Fault.CURRENT_CHANGED
             self._report(events, changed[0], frame, now, changed[1])
         if self._quiet >= settings.settle_frames and self._currents.frames:
             self.ready = True

@@ -24,6 +24,8 @@ from coneskin.skin.sensor import Sensor
 
 WEAK = "it presses too lightly for a place"  #: below the level from which places are told
 CONTRADICTS = "the guides of a phase differ too much for one contact"  #: the frame itself
+#: a sheet or a bond is another since the guard began, and so is the place that a reading means
+ALTERED = "a drive current has changed since the guard began: look at the sheet, and run coneskin doctor"
 MOVES = "it has only begun, or moves"  #: the place is not that of the frame before
 
 

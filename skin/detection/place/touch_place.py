@@ -20,7 +20,7 @@ from coneskin.skin.wire import Frame
 
 from .place_estimate import PlaceEstimate, PlaceEstimator, SheetConductances
 from .seam_contact import SeamCertainty, SeamPlace
-from .single_contact import CONTRADICTS, DANGEROUS_ANGLE, MOVES, WEAK, SingleContactTest
+from .single_contact import ALTERED, CONTRADICTS, DANGEROUS_ANGLE, MOVES, WEAK, SingleContactTest
 from .touch_filter import TouchFilter
 
 _FLOOR_FRAMES: Final = 128  # frames; no estimate is made anew for more
@@ -45,6 +45,9 @@ class TouchPlace:
         currents: of the untouched sensor.
         leak: between its layers, which is no part of a touch.
         guides: of the untouched sensor, with what mains do to them.
+
+    Attributes:
+        altered: a drive current has changed since the guard began. No place is certain from then on.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class TouchPlace:
         self._filter = TouchFilter(self._scale)
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
+        self.altered = False
         self._located = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
@@ -235,6 +239,8 @@ class TouchPlace:
         self, reading: Reading, matrix: ContactMatrix, level: float, u: float, estimate: PlaceEstimate | None
     ) -> str:
         """Return why the place is not certain. Empty where it is."""
+        if self.altered:
+            return ALTERED
         if not reading.location_valid:
             self._newest = None
             return WEAK if reading.level < self._level else CONTRADICTS
@@ -259,7 +265,7 @@ class TouchPlace:
     def _over_seam(self, reading: Reading, matrix: ContactMatrix, now: float) -> SeamPlace | None:
         """Return the place of a press over the seam, and why it is not certain. None where it is none."""
         noise, mean = self._noise, self._filter
-        if noise is None or not self._seam.may_be(mean.values):
+        if noise is None or self.altered or not self._seam.may_be(mean.values):
             self._seam.interrupt()
             return None
         whole = ContactMatrix(*mean.values, 0.0, 0.0, 0.0)

@@ -14,7 +14,7 @@ from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak
 from coneskin.skin.detection.place.place_estimate import PlaceEstimator
-from coneskin.skin.detection.place.single_contact import SingleContactTest
+from coneskin.skin.detection.place.single_contact import ALTERED, SingleContactTest
 from coneskin.skin.detection.place.touch_place import TouchPlace
 from coneskin.skin.electronics import Electronics, Polarity
 from coneskin.skin.sensor import Sensor
@@ -167,3 +167,20 @@ def test_a_centre_far_off_the_sheet_has_a_finite_velocity():
         place = places.feed(frame, read(sensor, frame), 0.9, 1e-3 * number, 1e-3)
     assert math.hypot(*place.velocity) < math.inf
     assert 0.0 <= place.u <= sensor.frustum.slant
+
+
+@pytest.mark.parametrize(("radial", "angular", "certain"), [(1.0, 1.0, True), (0.97, 1.0, False), (1.0, 0.97, False)])
+def test_no_place_is_certain_once_a_sheet_has_changed(radial, angular, certain):
+    """An electrode of which a part peels off moves every place: the currents that are learned anew do not tell it."""
+    detector, rng = Detector(SENSOR), random.Random(5)
+    for number in range(6 * LEARNED):
+        contact = LayerContact(0.2, 1.5, 2e-3)
+        frame = measured(SENSOR, (contact,) if number > 5 * LEARNED else ())._asdict()
+        if number > 2 * LEARNED:
+            frame |= {"radial_current": radial * frame["radial_current"]}
+            frame |= {"angular_current": angular * frame["angular_current"]}
+        counts = {n: max(0, round(frame[n] + rng.gauss(0.0, 0.7))) for n in COUNTS}
+        detector.feed(Frame(**{**frame, **counts, "sequence": number, "clock_us": 5000 * number}), 0.005 * number)
+    touch = detector.reading_now
+    assert touch is not None
+    assert (touch.location_valid, touch.doubt == ALTERED) == (certain, not certain)
