@@ -6,7 +6,6 @@ then each of its touches begins from there.
 
 from __future__ import annotations
 
-import copy
 import gc
 import struct
 import time
@@ -87,12 +86,7 @@ def decode(sitting: Sitting) -> dict[str, np.ndarray]:
         frames); notone, whether a touch is told as not one disc; faults, whether any was reported.
     """
     sensor, untouched, touches = sitting.sensor(), sitting.untouched, sitting.touches
-    learned = TouchStream([sensor], sitting.settings())
-    for number, counts in enumerate(untouched.tolist()):
-        learned.feed(packet(number, counts), FRAME_PERIOD * number)
-    if not learned.ready:
-        fault = learned.detectors[0].fault
-        raise RuntimeError(f"not ready after {len(untouched)} frames: {fault.name if fault else 'no reason'}")
+    learning = [packet(number, counts) for number, counts in enumerate(untouched.tolist())]
     shape = touches.shape[:2]
     out = {name: np.full(shape, np.nan) for name in ("u", "phi", "uu", "us", "ss")}
     out |= {name: np.zeros(shape, bool) for name in ("valid", "touched")}
@@ -101,8 +95,12 @@ def decode(sitting: Sitting) -> dict[str, np.ndarray]:
     clock = time.perf_counter
     gc.disable()
     for k, frames in enumerate(touches.tolist()):
-        stream = copy.deepcopy(learned, {id(sensor): sensor})
+        stream = TouchStream([sensor], sitting.settings())  # compiled, one that has learned cannot be copied
+        for number, data in enumerate(learning):
+            stream.feed(data, FRAME_PERIOD * number)
         detector = stream.detectors[0]
+        if not stream.ready:
+            raise RuntimeError(f"not ready after {len(learning)} frames: {detector.fault}")
         for n, counts in enumerate(frames):
             number = len(untouched) + n
             data = packet(number, counts)
