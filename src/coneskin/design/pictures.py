@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
     from coneskin.geometry.fit.touch_weights import TouchWeights
     from coneskin.geometry.mesh import Mesh
-    from coneskin.geometry.pose import Pose
 
 
 def draw_pictures(
@@ -54,17 +53,11 @@ def draw_pictures(
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    with needed_package("matplotlib", "drawing pictures (--no-pictures leaves them out)", "design"):
-        from matplotlib.figure import Figure
     (folder / "pictures").mkdir()
     done: list[tuple[str, str]] = []
 
     def picture(name: str, size: tuple[float, float], caption: str, draw: Callable[..., None], *args: Any) -> None:
-        """Draw a picture on a figure of a size [inch]."""
-        with picture_style():
-            figure = Figure(figsize=size, layout=None if draw is draw_link else "constrained")
-            draw(figure, *args)
-            figure.savefig(folder / "pictures" / f"{name}.png", dpi=130, bbox_inches="tight", pad_inches=0.15)
+        draw_file(folder / "pictures" / f"{name}.png", size, draw, *args)
         done.append((caption, f"pictures/{name}.png"))
 
     progress("drawing the link")
@@ -138,36 +131,39 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
         axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")
 
 
-def draw_skin(
-    file: Path, meshes: Mapping[str, Mesh], poses: Mapping[str, Pose], sheets: Sequence[tuple[str, SheetDesign]]
-) -> None:
-    """Write the picture of a robot with its sheets to a file; the rest as for ``draw_robot``."""
-    from matplotlib.figure import Figure
-
-    with picture_style():
-        figure = Figure(figsize=(10, 9))
-        draw_robot(figure, meshes, poses, sheets)
-        figure.savefig(file, dpi=130, bbox_inches="tight", pad_inches=0.15)
-
-
-def draw_curve(file: Path, steps: Sequence[tuple[int, float]], names: Sequence[str], included: int) -> None:
-    """Draw what touchable area [m2] each number of wires allows on a robot.
+def draw_file(file: Path, size: tuple[float, float], draw: Callable[..., None], *args: Any) -> None:
+    """Write what a function draws on an empty figure.
 
     Args:
         file: to write.
+        size: of the figure [inch].
+        draw: takes the figure and the arguments.
+        args: further arguments.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    with needed_package("matplotlib", "drawing pictures (--no-pictures leaves them out)", "design"):
+        from matplotlib.figure import Figure
+    with picture_style():
+        figure = Figure(figsize=size, layout=None if draw in (draw_link, draw_robot) else "constrained")
+        draw(figure, *args)
+        figure.savefig(file, dpi=130, bbox_inches="tight", pad_inches=0.15)
+
+
+def draw_curve(figure: Any, steps: Sequence[tuple[int, float]], names: Sequence[str], included: int) -> None:
+    """Draw what touchable area [m2] each number of wires allows on a robot.
+
+    Args:
+        figure: an empty figure of matplotlib.
         steps: wires and area.
         names: of the sheet that each brings.
         included: how many of them are included.
     """
-    from matplotlib.figure import Figure
-
     points = [(0.0, 0.0), *((float(wires), 1e4 * area) for wires, area in steps)]
-    with picture_style():
-        figure = Figure(figsize=(8, 4.5), layout="constrained")
-        axes = figure.add_subplot()
-        axes.step(*zip(*points, strict=True), where="post", color="#2a7fb8")
-        axes.plot(*zip(*points[1 : included + 1], strict=True), "o", color="#2a7fb8")
-        for at, name in zip(points[1:], names, strict=True):
-            axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
-        axes.set(xlabel="wires", ylabel="touchable active area [cm2]")
-        figure.savefig(file, dpi=130)
+    axes = figure.add_subplot()
+    axes.step(*zip(*points, strict=True), where="post", color="#2a7fb8")
+    axes.plot(*zip(*points[1 : included + 1], strict=True), "o", color="#2a7fb8")
+    for at, name in zip(points[1:], names, strict=True):
+        axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
+    axes.set(xlabel="wires", ylabel="touchable active area [cm2]")

@@ -278,13 +278,15 @@ def design_robot(
             built += [_BuiltSheet(name, *one) for one in zip(design.sheets, figures, strict=True)]
         progress("drawing and writing what holds for the robot")
         if pictures:
-            from .pictures import draw_curve, draw_skin
+            from .link_picture import draw_robot
+            from .pictures import draw_curve, draw_file
 
             angles = [min(max(0.0, joint.lower), joint.upper) for joint in joints]
             drawn = [(one.link, one.sheet) for one in built]
-            draw_skin(draft / "robot.png", meshes, link_poses(joints, angles), drawn)
+            draw_file(draft / "robot.png", (10, 9), draw_robot, meshes, link_poses(joints, angles), drawn)
             names = [f"{one.link} {one.number}" for one in offered]
-            draw_curve(draft / "curve.png", [(one.wires, one.total) for one in offered], names, included)
+            steps = [(one.wires, one.total) for one in offered]
+            draw_file(draft / "curve.png", (8, 4.5), draw_curve, steps, names, included)
         _write_robot(draft, result, built, str(robot), files or FileOptions(), pictures)
     return result
 
