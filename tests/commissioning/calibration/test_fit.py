@@ -128,6 +128,17 @@ def test_the_next_mark_is_where_the_map_is_known_least() -> None:
     assert fit_map(sensor, touched(sensor, through(AFFINE), 16, 0.3e-3)).enough
 
 
+@pytest.mark.parametrize("wrong", range(4))
+def test_of_four_touches_none_may_be_15_mm_beside_its_mark(wrong: int) -> None:
+    sensor = SENSORS[0]
+    touches = touched(sensor, lambda place: place, 4, 0.3e-3)
+    fit_map(sensor, touches)
+    mark, read = touches[wrong]
+    touches[wrong] = KnownTouch(mark, read._replace(phi=read.phi + 0.015 / sensor.frustum.radius_at(read.u)))
+    with pytest.raises(SkinError, match="its touches contradict each other"):
+        fit_map(sensor, touches)
+
+
 @pytest.mark.parametrize("count", [9, 16])
 def test_a_touch_beside_its_mark_is_left_out_and_named(count: int) -> None:
     sensor = SENSORS[0]

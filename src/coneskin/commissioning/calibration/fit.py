@@ -116,6 +116,7 @@ _SKEW_WAVES = math.pi * np.array([1.0, 3.0])[:, None, None]
 _REST_RATIOS = (1.0, 1.3, 2.0, 4.0, 8.0)  # standard deviation of a touch over the marks' own error
 _SIMPLER_ODDS = 3.0  # that a group of terms, or anything beside them, is not there, before any touch
 _ENOUGH_SHARE = 0.9  # of the map's error; another mark that leaves more of it is not worth its touch
+_MOST_CLAIMED = 2.0  # cross-validated error over what the map and the marks leave; 1.8 at most of 240 drawn skins
 _MIN_ROBUST = 6  # touches; among fewer none can be called wrong
 _MAX_WRONG = 0.25  # part of the touches that may be left out
 _MAX_DEVIATIONS = 3.5  # by which a touch that is left out misses what most others say
@@ -211,8 +212,8 @@ def fit_map(
         sheet_ohms: what its untouched sheets have per square, upper and lower, for the message of a refusal [ohm].
 
     Raises:
-        SkinError: there are too few touches, or the sensor reads so wrongly that it is another sheet, or is wired or
-            mounted otherwise than it should be; the message says the likely cause.
+        SkinError: there are too few touches, or the sensor reads so wrongly that it is another sheet, is wired or
+            mounted otherwise than it should be, or its touches contradict each other; the message says the cause.
     """
     _check_touches(sensor, touches)
     axes = _axes(sensor, touches)
@@ -229,6 +230,14 @@ def fit_map(
     place_map = PlaceMap(sensor.frustum, tuple(numbers[0]), tuple(numbers[1]))
     left = [posterior.left for posterior in posteriors]
     map_error, next_mark, then = _untouched_error(grid, posteriors, mark_error)
+    after = Errors.of(*left)
+    claimed = math.sqrt(2.0 * (map_error**2 + mark_error**2))
+    if after.rms > _MOST_CLAIMED * claimed:
+        raise SkinError(
+            f"{sensor.name} cannot be calibrated: its touches contradict each other. What the others say misses each "
+            f"by {1e3 * after.rms:.1f} mm (rms), where {1e3 * claimed:.1f} mm are likely: was one beside its mark? "
+            "Touch nine marks, of which a wrong one is found"
+        )
     every = [axis.rest(posterior.numbers) for axis, posterior in zip(axes, posteriors, strict=True)]
     for whole, part in zip(every, left, strict=True):
         whole[used] = part
@@ -238,7 +247,7 @@ def fit_map(
         posteriors[1].words,
         tuple(bool(value) for value in used),
         Errors.of(inside[0].missed, inside[1].missed),
-        Errors.of(*left),
+        after,
         tuple(zip(every[0].tolist(), every[1].tolist(), strict=True)),
         map_error,
         next_mark,
