@@ -48,6 +48,9 @@ class BareSides:
     Args:
         model: the arm.
         sheets: each skin: index of its link's DH frame, and its side in that frame.
+
+    Attributes:
+        parts: of the arm, in words, that have such a side.
     """
 
     def __init__(self, model: ArmModel, sheets: Sequence[tuple[int, PlacedFrustum]]) -> None:
@@ -68,6 +71,7 @@ class BareSides:
                     stations += [_Station(name, link, _along(begin, end, t)) for t in (at, low)]
                 at = max(at, high)
         self._stations = tuple(stations)
+        self.parts = tuple(dict.fromkeys(f"strip of the {one.name}" if one.strip else one.name for one in stations))
 
     def way(self, q: Joints, there: Sequence[float]) -> tuple[float, str]:
         """Return how far a bare surface moves outward at most [m], and which part's that is.

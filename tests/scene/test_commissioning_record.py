@@ -1,6 +1,7 @@
 """The commissioning record: what makes it void, and that the arm then only stops."""
 
 import json
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -213,6 +214,14 @@ def test_the_check_lists_it(tmp_path: Path) -> None:
     assert said.startswith("NOT VALID: the arm only stops; there is no commissioning record")
     write_passed_record(scene)
     assert summarize(with_commissioning(scene, 0.0))["commissioning"].startswith("passed on ")
+
+
+@pytest.mark.parametrize(("bare_side", "kind"), [("stop", "retreat"), ("allowed", "retreat"), ("stop", "stop")])
+def test_the_check_names_what_no_skin_covers_where_it_may_not_lead(bare_side: str, kind: str) -> None:
+    text = re.sub('bare_side = ".*"', f'bare_side = "{bare_side}"', SERIAL_RETREAT).replace('"retreat"', f'"{kind}"')
+    told = summarize(parse_scene(text if kind == "retreat" else text.replace('bare_side = "stop"', "")))
+    assert ("no skin on" in told) is ((bare_side, kind) == ("stop", "retreat"))
+    assert "wrist 3; where one would lead" in told.get("no skin on", "wrist 3; where one would lead")
 
 
 RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\n'

@@ -165,8 +165,8 @@ def _bare_way(bare: BareSides, q: Joints, there: Sequence[float]) -> str:
     if way <= MAX_BARE_WAY:
         return ""
     return (
-        f"no skin covers the {part}, which would move {1e3 * way:.0f} mm outward ({1e3 * MAX_BARE_WAY:g} mm at most): "
-        'cover it, or write bare_side = "allowed"'
+        f"no skin covers the {part}, which would lead: it may move outward by {1e3 * MAX_BARE_WAY:g} mm, not more; "
+        'cover it, or write bare_side = "allowed" in [reaction]'
     )
 
 

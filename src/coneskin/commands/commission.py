@@ -46,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     """Commission the skin of a scene, or list its marks."""
     from coneskin.commissioning.acceptance.commission import Commissioner
     from coneskin.commissioning.skin_watch import TouchSession
+    from coneskin.scene.build import bare_parts
     from coneskin.scene.commissioning_record import write_record
     from coneskin.scene.reader import load_scene
 
@@ -70,7 +71,10 @@ def run(args: argparse.Namespace) -> int:
         print('and hold it until it is read. "n" and Enter: out of reach, name another. Ctrl-C ends it.', flush=True)
     record = commissioner.run(args.by, begin)
     path = write_record(scene, record)
-    facts = {"kind": "end", "passed": record.passed, "cause": record.cause, "record": str(path)}
+    bare = bare_parts(scene)
+    facts = {"kind": "end", "passed": record.passed, "cause": record.cause, "record": str(path), "no_skin_on": bare}
     said = "passed: the arm may move away from touches" if record.passed else "NOT passed: the arm only stops"
+    if record.passed and bare:
+        said += f", unless what has no skin would lead (all or a part of {bare}); bare_side in [reaction] decides that"
     print(json.dumps(facts) if args.json else f"{terminal.clear()}{said}; written to {path}")
     return 0 if record.passed else 1

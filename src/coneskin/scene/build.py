@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from .values.scene import Scene, SpeedLimitScene
 
+_AWAY_KINDS = "retreat", "comply"  # of a reaction that moves the arm
 _MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
 
 
@@ -78,6 +79,17 @@ def withheld_motion(scene: Scene) -> str:
     if not scene.moves_away or (scene.commissioning is not None and scene.commissioning.valid):
         return ""
     return scene.commissioning.note if scene.commissioning else "nobody has looked for a commissioning record"
+
+
+def bare_parts(scene: Scene) -> str:
+    """Return the parts of the arm without a skin, where no reaction may move it if one leads; empty where it may."""
+    reactions = scene.default_reaction, *(rule.reaction for rule in scene.rules)
+    if scene.arm is None or not any(one.kind in _AWAY_KINDS and one.bare_side == "stop" for one in reactions):
+        return ""
+    from coneskin.robot.reaction.bare_side import BareSides
+
+    placed = place_on_arm(replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links)))
+    return ", ".join(BareSides(scene.arm.arm_model, [(item.link, item.frustum) for item in placed]).parts)
 
 
 def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import RobotRefused
 
+from .build import bare_parts
 from .tables.source_tables import source_label
 
 if TYPE_CHECKING:
@@ -83,6 +84,10 @@ def summarize(scene: Scene) -> dict[str, Any]:
         found["source"] = source_label(scene.source)
     if scene.arm:
         found["reaction"] = _reaction(scene.default_reaction)
+        if bare := bare_parts(scene):
+            found["no skin on"] = (
+                f"all or a part of {bare}; where one would lead, the arm only stops: cover it, or write bare_side"
+            )
         if scene.commissioning:
             valid, note = scene.commissioning.valid, scene.commissioning.note
             found["commissioning"] = note if valid else f"NOT VALID: the arm only stops; {note}"

@@ -38,6 +38,7 @@ def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Out
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["kind"] for line in lines if line["kind"] != "reading"] == ["mark", "passed"] * 5 + ["sensor", "end"]
     assert lines[-1]["passed"] is True
+    assert "wrist 3" in lines[-1]["no_skin_on"]
     assert main(["doctor", str(path), "--check", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["commissioning"].endswith("by a test, 5 marks")
 
