@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from bisect import bisect_right
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -139,11 +140,7 @@ def sync_places(data: bytes, sync: bytes = SYNC) -> tuple[list[int], int, float]
         its places, the commonest distance from one to the next [bytes] (0 where there are not two), and the share of
         the distances that are that one.
     """
-    places = []
-    at = data.find(sync)
-    while at >= 0:
-        places.append(at)
-        at = data.find(sync, at + 1)
+    places = [found.start() for found in re.finditer(re.escape(sync), data)]
     steps = Counter(b - a for a, b in itertools.pairwise(places))
     if not steps:
         return places, 0, 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate, pairwise
 
 from coneskin.core.finding import Finding
 from coneskin.skin.sensor import Sensor
@@ -122,9 +123,5 @@ def _find_in_frames(capture: Capture, found: FoundFrames, sensors: Sequence[Sens
 
 def _by_device(frames: Sequence[Frame]) -> list[float]:
     """Return the times of frames by their own clock [s], for bytes from a file."""
-    total, last, times = 0.0, frames[0].clock_us, []
-    for frame in frames:
-        total += ((frame.clock_us - last) & 0xFFFFFFFF) * 1e-6
-        last = frame.clock_us
-        times.append(total)
-    return times
+    steps = ((after.clock_us - before.clock_us) & 0xFFFFFFFF for before, after in pairwise(frames))
+    return [1e-6 * total for total in accumulate(steps, initial=0)]

@@ -111,19 +111,12 @@ def _gain(data: bytes, frequency: Counter[int], ratio: float, inverted: bool) ->
 
 def _shortest_run(data: bytes) -> float:
     """Return the length [bits] that nearly all runs of equal bits have at least, each byte taken with its start bit."""
-    lengths: Counter[int] = Counter()
-    for byte in data:
-        runs = [len(list(same)) for _, same in groupby((0, *(byte >> bit & 1 for bit in range(8)), 1))]
-        for run in runs[:-1]:  # the last one goes on
-            lengths[run] += 1
     if len({*data}) < 2:
         return 0.0
-    short = 0
-    for run in sorted(lengths):
-        short += lengths[run]
-        if short > (1.0 - _SLOW_SHARE) * lengths.total():
-            return float(run)
-    return 0.0
+    bits = ((0, *(byte >> bit & 1 for bit in range(8)), 1) for byte in data)
+    runs = ([len(list(same)) for _, same in groupby(row)] for row in bits)
+    lengths = sorted(run for row in runs for run in row[:-1])  # the last one goes on
+    return float(lengths[int((1.0 - _SLOW_SHARE) * len(lengths))])
 
 
 def find_coding(data: bytes) -> Finding | None:
@@ -131,7 +124,7 @@ def find_coding(data: bytes) -> Finding | None:
     for cause, words, undo in _BYTE_CODINGS:
         frames, covered = count_frames(undo(data))
         if frames >= _MIN_FRAMES and covered >= _MIN_COVERED:
-            return cause.found(words)
+            return cause.found(f"the bytes are frames with {words}")
     return None
 
 
@@ -262,27 +255,15 @@ def _bursts(capture: Capture) -> Iterator[bytes]:
         yield burst
 
 
-#: cause, words, what undoes the coding
+#: cause, what was done to the frames, what undoes it
 _BYTE_CODINGS: tuple[tuple[Cause, str, Callable[[bytes], bytes]], ...] = (
-    (Cause.INVERTED, "the bytes are frames with every bit inverted", lambda data: data.translate(_INVERTED_BITS)),
-    (
-        Cause.BIT_ORDER,
-        "the bytes are frames with the bits of each byte reversed",
-        lambda data: data.translate(_REVERSED_BITS),
-    ),
-    (
-        Cause.INVERTED,
-        "the bytes are frames with every bit inverted, and reversed",
-        lambda data: data.translate(_REVERSED_BITS).translate(_INVERTED_BITS),
-    ),
-    (
-        Cause.NIBBLES_SWAPPED,
-        "the bytes are frames with the halves of each byte exchanged",
-        lambda data: data.translate(_SWAPPED_NIBBLES),
-    ),
-    (Cause.WORDS_SWAPPED, "the bytes are frames with the two bytes of each word exchanged", _swap_words),
-    (Cause.SLIP, "the frames are wrapped in SLIP", undo_slip),
-    (Cause.COBS, "the frames are coded in COBS", _undo_cobs),
+    (Cause.INVERTED, "every bit inverted", lambda data: data.translate(_INVERTED_BITS)),
+    (Cause.BIT_ORDER, "the bits of each byte reversed", lambda data: data.translate(_REVERSED_BITS)),
+    (Cause.INVERTED, "every bit inverted, and reversed", lambda data: data.translate(_REVERSED_BITS[::-1])),
+    (Cause.NIBBLES_SWAPPED, "the halves of each byte exchanged", lambda data: data.translate(_SWAPPED_NIBBLES)),
+    (Cause.WORDS_SWAPPED, "the two bytes of each word exchanged", _swap_words),
+    (Cause.SLIP, "SLIP around them", undo_slip),
+    (Cause.COBS, "COBS as their coding", _undo_cobs),
 )
 _TEXT_CODINGS: tuple[tuple[Cause, str, Callable[[bytes], bytes]], ...] = (
     (Cause.HEX_TEXT, "frames come as hexadecimal digits", _undo_hex),

@@ -168,16 +168,8 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
 
 def _broken_frames(gaps: Sequence[bytes]) -> list[bytes]:
     """Return the pieces that begin as a frame does, each up to the next such beginning."""
-    pieces = []
-    for gap in gaps:
-        at = gap.find(SYNC)
-        while at >= 0:
-            end = gap.find(SYNC, at + 2)
-            piece = gap[at : end if end >= 0 else len(gap)]
-            if len(piece) >= 8 and piece[2] == VERSION and piece[3] in FRAME_LENGTHS:
-                pieces.append(piece)
-            at = end
-    return pieces
+    pieces = [gap[at:end] for gap in gaps for at, end in itertools.pairwise([*sync_places(gap)[0], len(gap)])]
+    return [piece for piece in pieces if len(piece) >= 8 and piece[2] == VERSION and piece[3] in FRAME_LENGTHS]
 
 
 def _repair(broken: Sequence[bytes]) -> tuple[Cause, str] | None:
