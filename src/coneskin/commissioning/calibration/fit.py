@@ -106,7 +106,7 @@ def _check_bends(sensor: Sensor, along: Sequence[float], around: Sequence[float]
 
 _AFFINE_TERMS = 3
 _AFFINE_WIDTHS = (0.0, 0.003, 0.03)  # of a fraction; standard deviations of offset and gain, and of shear
-_ERROR_CAUSES = (
+_ERROR_BEND_CAUSES = (
     *((name, 0.0) for name in SHEET_CLASSES),
     *(("ideal", width) for width in (0.005, 0.02, 0.06)),
 )  # of bends: a class of sheets, or any with a standard deviation of the terms that bend
@@ -217,7 +217,7 @@ def fit_map(
     """
     _check_touches(sensor, touches)
     axes = _axes(sensor, touches)
-    used = _agreeing(axes, mark_error)
+    used = np.array(agreeing(sensor, touches, mark_error))
     inside = [axis.pick(used) for axis in axes]
     along, around = (_solve(axis, _AFFINE_TERMS).tolist()[:2] for axis in inside)
     _check_offsets_and_gains(sensor, along, around, sheet_ohms)
@@ -245,7 +245,7 @@ def fit_map(
         place_map,
         posteriors[0].words,
         posteriors[1].words,
-        tuple(bool(value) for value in used),
+        tuple(used.tolist()),
         Errors.of(inside[0].missed, inside[1].missed),
         after,
         tuple(zip(every[0].tolist(), every[1].tolist(), strict=True)),
@@ -254,11 +254,6 @@ def fit_map(
         then > _ENOUGH_SHARE * map_error,
         _extra_ohms(sensor, place_map),
     )
-
-
-def agreeing(sensor: Sensor, touches: Sequence[KnownTouch], mark_error: float) -> tuple[bool, ...]:
-    """Return of each touch whether it agrees with what most of them say; arguments as of ``fit_map``."""
-    return tuple(bool(value) for value in _agreeing(_axes(sensor, touches), mark_error))
 
 
 def _axes(sensor: Sensor, touches: Sequence[KnownTouch]) -> tuple[_Axis, _Axis]:
@@ -272,11 +267,8 @@ def _axes(sensor: Sensor, touches: Sequence[KnownTouch]) -> tuple[_Axis, _Axis]:
         for_x, for_y = map_terms(seen_x, seen_y)
         along.append((x - seen_x, for_x, cone.slant / _slope(sensor, mark.u), (seen_x, seen_y)))
         around.append((turned, for_y, cone.wrap * cone.radius_at(mark.u), (seen_y, seen_x)))
-    return _axis(along), _axis(around)
-
-
-def _axis(rows: Sequence[tuple[float, tuple[float, ...], float, tuple[float, float]]]) -> _Axis:
-    return _Axis(*map(np.array, zip(*rows, strict=True)))
+    of_along, of_around = (_Axis(*map(np.array, zip(*rows, strict=True))) for rows in (along, around))
+    return of_along, of_around
 
 
 def _fractions(sensor: Sensor, place: Place) -> tuple[float, float]:
@@ -309,7 +301,7 @@ class _Posterior(NamedTuple):
 
 
 def _flaws(sheets: SheetTolerance, ohms: tuple[float, float], axis: _Axis) -> Floats:
-    """Return the covariances of what sheets of a class read wrongly at places [m^2]; ohms as of ``_average``."""
+    """Return the covariances of what sheets of a class read wrongly at places [m^2]."""
     x, y = axis.places.T[:, :, None]
     leads = (sheets.lead**2 + (LINE_SHARE * sheets.line) ** 2) / ohms[0] ** 2
     sines = np.sin(_PATCH_WAVES * x) / _PATCH_WAVES
@@ -326,15 +318,11 @@ def _flaws(sheets: SheetTolerance, ohms: tuple[float, float], axis: _Axis) -> Fl
 def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: float) -> _Posterior:
     """Fit all causes of bends and widths of the priors, and average by how likely each makes the touches.
 
-    Args:
-        axis: of the touches.
-        sheet: of places all over it.
-        ohms: of the sheet from electrode to electrode, and per square.
-        mark_error: see ``fit_map`` [m].
+    Axis is of the touches, sheet of places all over, ohms from electrode to electrode and per square.
     """
     missing, count, fits = axis.missed, len(axis.missing), []
     every = _Axis(*map(np.concatenate, zip(axis, sheet, strict=True)))
-    for cause in _ERROR_CAUSES:
+    for cause in _ERROR_BEND_CAUSES:
         name, bend = cause
         flaws = _flaws(SHEET_CLASSES[name], ohms, every)
         for affine, shear, ratio in product(_AFFINE_WIDTHS, _AFFINE_WIDTHS, _REST_RATIOS):
@@ -343,13 +331,20 @@ def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: f
             noise = (ratio * mark_error) ** 2
             inverse = np.linalg.inv(prior[:count, :count] + noise * np.eye(count))
             likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
-            absent = (affine, shear, ratio - 1.0, _ERROR_CAUSES.index(cause)).count(0)
+            absent = (affine, shear, ratio - 1.0, _ERROR_BEND_CAUSES.index(cause)).count(0)
             gain = prior[count:, :count] @ inverse
             alone = inverse @ missing / np.diag(inverse)  # what is missing to what the other touches say
             covariance = prior[count:, count:] - gain @ prior[:count, count:]
             rest = noise - mark_error**2
             fits.append(
-                (likely + absent * math.log(_SIMPLER_ODDS), gain, covariance, alone, rest, cause != _ERROR_CAUSES[0])
+                (
+                    likely + absent * math.log(_SIMPLER_ODDS),
+                    gain,
+                    covariance,
+                    alone,
+                    rest,
+                    cause != _ERROR_BEND_CAUSES[0],
+                )
             )
     odds, gains, covariances, alones, rests, bent = (np.array(each) for each in zip(*fits, strict=True))
     weights = np.exp(odds - odds.max())
@@ -385,12 +380,11 @@ def _untouched_error(
     return math.sqrt(0.5 * max(0.0, float(np.mean(now)))), places[best], math.sqrt(0.5 * max(0.0, float(then[best])))
 
 
-def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
-    """Return which touches agree with what most of them say, by offset and gain."""
-    count = len(axes[0].missing)
-    used = np.ones(count, bool)
+def agreeing(sensor: Sensor, touches: Sequence[KnownTouch], mark_error: float) -> list[bool]:
+    """Return which touches agree with what most say, by offset and gain; arguments as of ``fit_map``."""
+    axes, count = _axes(sensor, touches), len(touches)
     if count < _MIN_ROBUST:
-        return used
+        return [True] * count
     rest = [np.abs(_least_median(axis)) for axis in axes]
     for _ in range(4):
         scales = [
@@ -401,7 +395,7 @@ def _agreeing(axes: Sequence[_Axis], mark_error: float) -> NDArray[np.bool_]:
         limit = max(_MAX_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
         used = misses <= limit
         rest = [np.abs(axis.rest(_solve(axis.pick(used), 2))) for axis in axes]
-    return used
+    return [bool(value) for value in used]
 
 
 def _least_median(axis: _Axis) -> Floats:
