@@ -192,10 +192,8 @@ def _list_hypotheses(sensor: Sensor) -> list[_WiringHypothesis]:
     found = [_WiringHypothesis(sensor, "nothing", None)]
     for name in _WIRE_NAMES:
         found.append(_WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name))
-    joints: list[tuple[str, Fault, tuple[str, str]]] = []
-    for name in _WIRE_NAMES:
-        fault = Fault.OPEN_UPPER if name in "AB" else Fault.OPEN_LOWER
-        joints.append((f"{name} joined to the supply", fault, (name, "supply")))
+    pairs = zip("ABCD", (Fault.OPEN_UPPER, Fault.OPEN_UPPER, Fault.OPEN_LOWER, Fault.OPEN_LOWER), strict=True)
+    joints = [(f"{name} joined to the supply", fault, (name, "supply")) for name, fault in pairs]
     joints += [("A joined with B", upper, ("A", "B")), ("C joined with D", lower, ("C", "D"))]
     for name, fault in ((plus_upper, upper), (minus_upper, leak), (plus_lower, lower), (minus_lower, leak)):
         joints.append((f"{name} joined to ground", fault, (name, "ground")))

@@ -103,17 +103,14 @@ def _find_sum(bodies: Sequence[bytes], tails: Sequence[bytes]) -> Finding | None
         "a Fletcher checksum": _fletcher,
         "a CRC of 8 bits": lambda data: crc16(data, 0x0700) >> 8,
     }
-    pairs = list(zip(bodies, tails, strict=True))
     for (words, kind), start in product(kinds.items(), _RANGE_WORDS):
-        hits = [0, 0, 0, 0]
-        for body, tail in pairs:
-            value = kind(body[start:]) & 0xFFFF
-            wide = value.to_bytes(2, "big")
-            low = value & 0xFF
-            hits[0] += tail in (wide, wide[::-1])
-            hits[1] += low == tail[0] and tail[1] == tails[0][1]
-            hits[2] += low == tail[1] and tail[0] == tails[0][0]
-        if max(hits) >= _AGREEING_SHARE * len(pairs) and len(pairs) >= 3:
+        wide = [(kind(body[start:]) & 0xFFFF).to_bytes(2, "big") for body in bodies]
+        hits = (
+            sum(tail in (value, value[::-1]) for value, tail in zip(wide, tails, strict=True)),
+            sum(value[1] == tail[0] and tail[1] == tails[0][1] for value, tail in zip(wide, tails, strict=True)),
+            sum(value[1] == tail[1] and tail[0] == tails[0][0] for value, tail in zip(wide, tails, strict=True)),
+        )
+        if max(hits) >= _AGREEING_SHARE * len(tails) and len(tails) >= 3:
             return Cause.CHECKSUM_KIND.found(f"the checksum is {words}, not a CRC of 16 bits")
     return None
 

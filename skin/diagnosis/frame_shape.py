@@ -147,8 +147,6 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
         gap, count = Counter(found.gaps).most_common(1)[0]
         if count >= _SAME_SHARE * len(found.gaps) and len(gap) <= 8:
             return Cause.EXTRA_BYTES.found(f"{short_hex(gap)} stands between the frames")
-        if printable_share(between) > 0.9:
-            return Cause.TEXT.found(f"text stands between the frames: {first_line(between)!r}")
     broken = _broken_frames(found.gaps)
     if (repaired := _repair(broken)) is not None:
         return repaired[0].found(f"{share}: {repaired[1]}")

@@ -88,8 +88,8 @@ def bare_parts(scene: Scene) -> str:
         return ""
     from coneskin.robot.reaction.bare_side import BareSides
 
-    placed = place_on_arm(replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links)))
-    return ", ".join(BareSides(scene.arm.arm_model, [(item.link, item.frustum) for item in placed]).parts)
+    sheets = [(item.link, item.frustum) for item in place_on_frusta(scene)]
+    return ", ".join(BareSides(scene.arm.arm_model, sheets).parts)
 
 
 def _arm(scene: Scene, placed: Sequence[SensorOnArm]) -> ArmSupervisor:
@@ -132,9 +132,7 @@ def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLi
     from coneskin.robot.guard.speed.permissible_speeds import PermissiblePatch, PermissibleSpeeds
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
 
-    # on the frusta, not on the meshes below: a mesh file must not be needed, and the speed of either is the same
-    bare = replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links))
-    places = {item.name: item for item in place_on_arm(bare)}
+    places = {item.name: item for item in place_on_frusta(scene)}  # the speed of the mesh below is the same
     patches = []
     for patch in limit.patches:
         at = places[patch.sensor]
@@ -230,6 +228,11 @@ def place_on_arm(scene: Scene, surfaces: Mapping[str, Floats] | None = None) -> 
         for item, frustum, surface in zip(link.sensors, frusta, on_mesh, strict=True):
             placed.append(SensorOnArm(item.sensor.name, link.name, index, frustum, surface, arm))
     return placed
+
+
+def place_on_frusta(scene: Scene) -> list[SensorOnArm]:
+    """Return the places of a scene's sensors where their frusta suffice: no mesh is read."""
+    return place_on_arm(replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links)))
 
 
 def _carried(scene: Scene, name: str, frustum: PlacedFrustum, surfaces: Mapping[str, Floats]) -> DisplacementMap:

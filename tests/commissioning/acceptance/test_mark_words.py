@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coneskin.commissioning.acceptance.marks import offer_marks, place_sensors, plan_marks
+from coneskin.commissioning.acceptance.marks import offer_marks, plan_marks
 from coneskin.commissioning.misreadings import RIGHT, Place, misfit
 from coneskin.commissioning.touching import Mark
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.pose import Pose
 from coneskin.robot.arm.kinematics import dh_mesh, link_pose, link_poses
 from coneskin.robot.arm.models import arm_model
+from coneskin.scene.build import place_on_frusta
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from tests.support.scenes import START, forearm_scene
@@ -68,7 +69,7 @@ def test_the_words_lead_to_the_place_on_a_link_that_is_not_round(q: tuple[float,
     text = forearm_scene().replace("xyz_mm = [0, 0, 80]", f"{pose}\nbend_wrap_deg = {wraps}\nbend_turn_deg = {turns}")
     text = re.sub(r"radius([12])_mm = [\d.]+", rf"radius\1_mm = {radius}", text)
     here = parse_scene(text)
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     found = offer_marks(item.sensor, placed, q)
     assert len(found) >= 9
     poses = link_poses(UR5E, q)
@@ -90,7 +91,7 @@ def test_the_words_lead_to_the_place_on_a_link_that_is_not_round(q: tuple[float,
 def test_the_words_lead_to_the_place_on_a_sheet_about_the_joint_at_the_end_of_a_link(link: str) -> None:
     """Such a sheet has no place along its link: its own ends are named, and the clock is seen along it."""
     here = scene(link, "xyz_mm = [0, 130, 0]\nrpy_deg = [90, 0, 0]")
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     found = offer_marks(item.sensor, placed, START)
     assert len({mark.where for mark in found}) == len(found) >= 9
     first, last = (np.array(placed.place_in_base(u, 1.0, START)[0]) for u in (0.0, item.sensor.frustum.slant))
@@ -111,7 +112,7 @@ def test_the_words_lead_to_the_place_on_a_sheet_about_the_joint_at_the_end_of_a_
 def test_the_words_lead_to_the_place(q: tuple[float, ...], pose: str) -> None:
     """Elbow and wrist from the kinematics; the sensor lies on the tube's axis. Independent of frusta and meshes."""
     here = scene(pose=f"xyz_mm = {pose}")
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     found = offer_marks(item.sensor, placed, q)
     assert len(found) >= 9
     for mark in found:
@@ -129,7 +130,7 @@ def test_the_words_lead_to_the_place(q: tuple[float, ...], pose: str) -> None:
 @given(joints)
 def test_the_direction_in_the_world_is_named_as_it_is(q: tuple[float, ...]) -> None:
     here = scene()
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     for mark in offer_marks(item.sensor, placed, q):
         _, normal = placed.place_in_base(mark.u, mark.phi, q)
         said = mark.where.split("the side that points ")[1]
@@ -142,7 +143,7 @@ def test_the_direction_in_the_world_is_named_as_it_is(q: tuple[float, ...]) -> N
 @pytest.mark.parametrize("q", [START, [0.0] * 6, [0.0, -math.pi / 2.0, 0.0, 0.0, 0.0, 0.0]])
 def test_every_link_has_marks(link: str, q: list[float]) -> None:
     here = scene(link)
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     plan = plan_marks(item.sensor, offer_marks(item.sensor, placed, q))
     assert plan is not None
     assert len({mark.where for mark in plan}) == len(plan)
@@ -167,7 +168,7 @@ def test_a_sheet_that_is_not_where_the_scene_says_misses_a_mark(
 ) -> None:
     """Any turn about the link, end for end or not, with any shift along it: within the tolerance, or it shows."""
     here = scene()
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     height = item.sensor.frustum.height
     flip = Pose.from_xyz_rpy((0.0, 0.0, height), (math.pi, 0.0, 0.0)) if over else Pose()
     off = Pose.from_xyz_rpy((0.0, 0.0, shift), (0.0, 0.0, math.radians(turn)))
@@ -186,7 +187,7 @@ def test_a_sheet_that_is_not_where_the_scene_says_misses_a_mark(
 
 def test_without_an_arm_the_words_name_the_electrodes() -> None:
     here = replace(scene(), arm=None)
-    (placed,), (item,) = place_sensors(here), here.sensors
+    (placed,), (item,) = place_on_frusta(here), here.sensors
     for mark in offer_marks(item.sensor, placed, None):
         match = re.fullmatch(
             r"(\d+) mm from electrode B \(end 1\) and (\d+) mm along the arc from electrode D", mark.where

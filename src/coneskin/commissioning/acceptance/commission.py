@@ -16,10 +16,11 @@ from coneskin.core.errors import RobotRefused, RobotTimeout
 from coneskin.core.version import __version__
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import load_driver
+from coneskin.scene.build import place_on_frusta
 from coneskin.scene.commissioning_record import CommissioningRecord, fingerprint
 from coneskin.scene.values.scene import Commissioning, Scene
 
-from .marks import offer_marks, place_sensors
+from .marks import offer_marks
 from .procedure import Procedure, SensorMarks
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def prepare(scene: Scene, q: Sequence[float] | None) -> Procedure:
     Raises:
         RobotRefused: a sensor is too small for marks that show every misreading.
     """
-    pairs = zip(scene.sensors, place_sensors(scene), strict=True)
+    pairs = zip(scene.sensors, place_on_frusta(scene), strict=True)
     procedure = Procedure([SensorMarks(item.sensor, offer_marks(item.sensor, place, q)) for item, place in pairs])
     if procedure.incomplete:
         raise RobotRefused(procedure.incomplete)

@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import power, shifts
 from coneskin.commissioning.touching import Mark
 from coneskin.robot.arm.vectors import added, cross, dot, minus, scaled
-from coneskin.scene.build import place_on_arm
 from coneskin.scene.commissioning_record import MIN_MARKS
 
 if TYPE_CHECKING:
     from coneskin.geometry.pose import Pose, Vector
     from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.build import SensorOnArm
-    from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
 MIN_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
@@ -82,11 +79,6 @@ _SIDE_STEPS = 720  # of a bent side, between which its azimuths are interpolated
 _DISTANCE_STEP = 0.005  # m; distances are multiples of it
 _MIN_COMPONENT = 0.35  # part of a direction from which on it is named
 _UPRIGHT_COSINE = math.cos(math.radians(30.0))  # from which on a link counts as upright
-
-
-def place_sensors(scene: Scene) -> list[SensorOnArm]:
-    """Return the places of a scene's sensors; meshes are not read, because only the frustum's side is needed."""
-    return place_on_arm(replace(scene, links=tuple(replace(link, mesh=None) for link in scene.links)))
 
 
 def offer_marks(sensor: Sensor, placed: SensorOnArm, q: Sequence[float] | None) -> list[Mark]:

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.commissioning.sheet_picture import draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
-
-from .marks import place_sensors
+from coneskin.scene.build import place_on_frusta
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
@@ -47,7 +46,7 @@ def _compose(figure: Any, scene: Scene, procedure: Procedure, q: Sequence[float]
     figure.set_size_inches(13.0, 5.4 * len(sensors))
     grid = figure.add_gridspec(len(sensors), 2, width_ratios=(1.25, 1.0))
     number = 1
-    for row, (item, placed) in enumerate(zip(sensors, place_sensors(scene), strict=True)):
+    for row, (item, placed) in enumerate(zip(sensors, place_on_frusta(scene), strict=True)):
         _draw_sheet(figure.add_subplot(grid[row, 0]), item, number)
         if q is not None:
             _draw_arm(figure.add_subplot(grid[row, 1], projection="3d"), item, placed, q, number)
