@@ -7,7 +7,7 @@ import binascii
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import groupby, product
 
 from coneskin.core.finding import Finding
@@ -73,16 +73,12 @@ def find_baud(data: bytes, baud: int | None) -> Finding | None:
     if len(data) < 64:
         return None
     frequency = Counter(data)
-    best, rate, inverted = (
-        max(
-            (_gain(data, frequency, candidate / baud, inverted), candidate, inverted)
-            for candidate in _BAUD_RATES
-            for inverted in (False, True)
-            if candidate != baud or inverted
-        )
-        if baud
-        else (0.0, 0, False)
+    tried = (
+        (_gain(data, frequency, candidate / baud, inverted), candidate, inverted)
+        for candidate, inverted in product(_BAUD_RATES, (False, True))
+        if baud and (candidate != baud or inverted)
     )
+    best, rate, inverted = max(tried, default=(0.0, 0, False))
     if best > 0.0 and inverted:
         return Cause.INVERTED.found(f"the bytes are what {rate} baud on an inverted line look like")
     if best > 0.0:
@@ -242,17 +238,15 @@ def _longest_chain(data: bytes, start: bytes, length_at: int, overhead: int) -> 
     return longest
 
 
-def _bursts(capture: Capture) -> Iterator[bytes]:
-    """Yield what came without a pause."""
-    burst, last = b"", None
+def _bursts(capture: Capture) -> list[bytes]:
+    """Return what came without a pause, each."""
+    bursts, last = [b""], -math.inf
     for time, piece in capture.pieces:
-        if last is not None and time - last > _BURST_PAUSE:
-            yield burst
-            burst = b""
-        burst += piece
+        if time - last > _BURST_PAUSE:
+            bursts.append(b"")
+        bursts[-1] += piece
         last = time
-    if burst:
-        yield burst
+    return bursts
 
 
 #: cause, what was done to the frames, what undoes it

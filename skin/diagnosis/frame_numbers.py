@@ -149,16 +149,12 @@ def _find_sequence(frames: Sequence[Frame], sensors: int) -> Finding | None:
         return None
     forward = [step for step in steps if 0 < step < 0x8000]
     if len(forward) < 0.7 * len(steps) or max(forward) > 4096:
-        return Cause.SEQUENCE_RANDOM.found(f"the sequence does not count: {_listing(frames)}")
+        return Cause.SEQUENCE_RANDOM.found(f"the sequence does not count: {[frame.sequence for frame in frames[-4:]]}")
     if share >= _STEADY_SHARE and step == sensors:
         return Cause.SEQUENCE_SHARED.found(f"the {sensors} sensors share one sequence, which goes up by {step}")
     if share >= _STEADY_SHARE:
         return Cause.SEQUENCE_STEPS.found(f"the sequence goes up by {step} from frame to frame")
     return None
-
-
-def _listing(frames: Sequence[Frame]) -> str:
-    return ", ".join(str(frame.sequence) for frame in frames[-4:])
 
 
 def _find_clock(frames: Sequence[Frame], numbers: FrameNumbers) -> Finding | None:
