@@ -120,15 +120,14 @@ def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, ti
         "D": SurfaceRectangle(first, last, field.phi1 - 2.0 * half / narrow + turn, field.phi1 - turn),
     }[which]
     full = f"{which} - {face.upper()} FACE UP"
-    for text in (*([f"{full} - {title}"] if title else []), full, which):
+    titled = [(f"{full} - {title}", _MIN_HEIGHT)] if title else []
+    for text, least in (*titled, (full, _MIN_HEIGHT), (which, 0.2e-3)):
         height = min(3e-3, 0.6 * plan.electrode)
-        while height >= _MIN_HEIGHT or text == which:
+        while height >= least:
             label = _label(surface, text, u, phi, height, along_edge=which in "CD")
             if _inside(surface, strip, label):
                 return (label,)
             height *= 0.9
-            if height < 0.2e-3:
-                break
     return ()
 
 

@@ -133,14 +133,7 @@ def _spread(
 
 
 def _clear_start(marks: Floats, extent: tuple[float, float], count: int, step: float) -> float:
-    """Return where the first of some windows begins: at the middle of a drawing, or beside, where no join meets marks.
-
-    Args:
-        marks: coordinates of the marks [mm], shape (n,).
-        extent: least and largest coordinate of the drawing [mm].
-        count: windows.
-        step: size of a window [mm].
-    """
+    """Return where the first of some windows begins [mm]: centred, or beside, where no join meets marks [mm]."""
     slack = count * step - (extent[1] - extent[0])
     start = extent[0] - 0.5 * slack
     shifts = sorted(slack * np.linspace(-0.5, 0.5, 41), key=abs)
@@ -267,12 +260,8 @@ def _tiles(tiling: _PageTiling, title: str) -> Iterator[list[str]]:
         clip = " ".join(map(_pdf_number, (left - bleed, bottom - bleed, width + 2 * bleed, height + 2 * bleed)))
         content = ["q", f"{clip} re W n", f"1 0 0 1 {_pdf_number(left - x)} {_pdf_number(bottom - y)} cm /D Do", "Q"]
         content += _crop_marks(left, bottom, width, height)
-        for dx, dy, mid_x, mid_y in (
-            (-1, 0, left, bottom + 0.5 * height),
-            (1, 0, left + width, bottom + 0.5 * height),
-            (0, -1, left + 0.5 * width, bottom),
-            (0, 1, left + 0.5 * width, bottom + height),
-        ):
+        for dx, dy in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+            mid_x, mid_y = left + 0.5 * (1 + dx) * width, bottom + 0.5 * (1 + dy) * height
             if (column + dx, row + dy) in tiling.cells:
                 content += _registration(mid_x, mid_y)
                 neighbour = tiling.cells.index((column + dx, row + dy)) + 1

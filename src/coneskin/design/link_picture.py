@@ -7,13 +7,12 @@ link shows where the sheets are, their ends, and the faces to measure from.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
 from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
@@ -261,20 +260,15 @@ def _border(design: SheetDesign) -> tuple[Any, Any, list[tuple[Any, Any]]]:
     return along, around, [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
 
 
-def draw_robot(
-    figure: Any, meshes: Mapping[str, Mesh], poses: Mapping[str, Pose], sheets: Sequence[tuple[str, SheetDesign]]
-) -> None:
+def draw_robot(figure: Any, links: Sequence[Mesh], sheets: Sequence[SheetDesign]) -> None:
     """Draw a robot from two opposite sides with the names of its sheets.
 
     Args:
         figure: an empty figure of matplotlib, without a layout engine.
-        meshes: of its links, each in the frame of that.
-        poses: of these frames.
-        sheets: each with the name of its link.
+        links: in one pose, in the frame of the robot.
+        sheets: in that frame.
     """
-    shown = [poses.get(link, Pose()).apply_all(sheet.outer_triangles().reshape(-1, 3)) for link, sheet in sheets]
-    links = [mesh.moved(poses.get(link, Pose())).triangles for link, mesh in meshes.items()]
-    body, owner = _body([*(corners.reshape(-1, 3, 3) for corners in shown), *links])
+    body, owner = _body([*(sheet.outer_triangles() for sheet in sheets), *(mesh.triangles for mesh in links)])
     hues = [_SHEET_COLOURS[index % 4] for index in range(len(sheets))]
     paints = _palette([*hues, *[_LINK_COLOUR] * len(links)])
     for side, way in enumerate((np.array([0.5, -1.0, 0.45]), np.array([-0.5, 1.0, 0.45]))):
@@ -283,18 +277,14 @@ def draw_robot(
         view.draw(axes, lambda hit, _: paints[owner[hit]], way + (0.4, 0.3, 0.5))
         view.draw_frame(axes)
         names = []
-        for (link, sheet), colour in zip(sheets, hues, strict=True):
-            cone, pose = sheet.place.frustum, poses.get(link, Pose())
-            points, normals = sheet.outer_face(
-                *np.meshgrid(np.linspace(0.0, cone.slant, 9), np.linspace(0.0, cone.wrap, 49))
-            )
-            points, turned = pose.apply_all(points.reshape(-1, 3)), normals.reshape(-1, 3) @ np.array(pose.rotation).T
-            seen = view.sees(points, turned)
+        for sheet, colour in zip(sheets, hues, strict=True):
+            along, around, _ = _border(sheet)
+            points, normals = (part.reshape(-1, 3) for part in sheet.outer_face(*np.meshgrid(along, around)))
+            seen = view.sees(points, normals)
             if seen.mean() >= 0.1:  # else the other side shows it better
                 flat = view.flat(points[seen])
                 at = flat[np.linalg.norm(flat - flat.mean(axis=0), axis=1).argmin()]
-                right = bool(at[0] > 0.5 * (view.low[0] + view.high[0]))
-                names.append((at, right, f"{link}, {sheet.name}", colour))
+                names.append((at, bool(at[0] > 0.5 * (view.low[0] + view.high[0])), sheet.name, colour))
         _write_beside(axes, view, names)
 
 

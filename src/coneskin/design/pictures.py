@@ -57,7 +57,7 @@ def draw_pictures(
     done: list[tuple[str, str]] = []
 
     def picture(name: str, size: tuple[float, float], caption: str, draw: Callable[..., None], *args: Any) -> None:
-        draw_file(folder / "pictures" / f"{name}.png", size, draw, *args)
+        _draw_file(folder / "pictures" / f"{name}.png", size, draw, *args)
         done.append((caption, f"pictures/{name}.png"))
 
     progress("drawing the link")
@@ -131,18 +131,8 @@ def _draw_deviation(figure: Any, design: SheetDesign, mesh: Mesh, tolerance: flo
         axes.text(at, 1.01, seam, transform=axes.transAxes, fontsize=7, ha="center")
 
 
-def draw_file(file: Path, size: tuple[float, float], draw: Callable[..., None], *args: Any) -> None:
-    """Write what a function draws on an empty figure.
-
-    Args:
-        file: to write.
-        size: of the figure [inch].
-        draw: takes the figure and the arguments.
-        args: further arguments.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
+def _draw_file(file: Path, size: tuple[float, float], draw: Callable[..., None], *args: Any) -> None:
+    """Write a file with what a function draws on an empty figure of a size [inch]."""
     with needed_package("matplotlib", "drawing pictures (--no-pictures leaves them out)", "design"):
         from matplotlib.figure import Figure
     with picture_style():

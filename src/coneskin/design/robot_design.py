@@ -60,12 +60,7 @@ class _Offer(NamedTuple):
     total: float  #: area that can be touched, with all before [m2]
 
 
-class _BuiltSheet(NamedTuple):
-    """A sheet that is written."""
-
-    link: str
-    sheet: SheetDesign
-    figures: BuildFigures
+_BuiltSheet = tuple[str, SheetDesign, BuildFigures]  # of a link, with its name before that of the sheet
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,18 +270,22 @@ def design_robot(
                 first_sensor=len(built),
                 figures=figures,
             )
-            built += [_BuiltSheet(name, *one) for one in zip(design.sheets, figures, strict=True)]
+            for sheet, item in zip(design.sheets, figures, strict=True):
+                built.append((name, dataclasses.replace(sheet, name=f"{name} {sheet.name}"), item))
         progress("drawing and writing what holds for the robot")
         if pictures:
             from .link_picture import draw_robot
-            from .pictures import draw_curve, draw_file
+            from .pictures import _draw_file, draw_curve
 
-            angles = [min(max(0.0, joint.lower), joint.upper) for joint in joints]
-            drawn = [(one.link, one.sheet) for one in built]
-            draw_file(draft / "robot.png", (10, 9), draw_robot, meshes, link_poses(joints, angles), drawn)
+            poses = link_poses(joints, [min(max(0.0, joint.lower), joint.upper) for joint in joints])
+            links = [mesh.moved(poses.get(name, Pose())) for name, mesh in meshes.items()]
+            drawn = [
+                dataclasses.replace(sheet, place=sheet.place.moved(poses.get(name, Pose()))) for name, sheet, _ in built
+            ]
+            _draw_file(draft / "robot.png", (10, 9), draw_robot, links, drawn)
             names = [f"{one.link} {one.number}" for one in offered]
             steps = [(one.wires, one.total) for one in offered]
-            draw_file(draft / "curve.png", (8, 4.5), draw_curve, steps, names, included)
+            _draw_file(draft / "curve.png", (8, 4.5), draw_curve, steps, names, included)
         _write_robot(draft, result, built, str(robot), files or FileOptions(), pictures)
     return result
 
@@ -350,15 +349,25 @@ def _write_robot(
 ) -> None:
     """Write what holds for the robot: its report, its parts on beds together, and the list of its files."""
     draft = _Draft(folder)
-    named = [dataclasses.replace(one.sheet, name=f"{one.link} {one.sheet.name}") for one in built]
-    beds, larger = _nested(named, files)
+    sheets, figures = [sheet for _, sheet, _ in built], [item for _, _, item in built]
+    beds, larger = _nested(sheets, files)
     for bed in beds:
         draft.write_drawing(Path("nested") / bed.slug, bed.sheets, bed.slug, files)
-    head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
     rows = []
     for count, one in enumerate(design.offered, 1):
         areas = f"{1e4 * one.active:.1f}", f"{1e4 * one.area:.1f}", f"{1e4 * one.total:.1f}"
         rows.append((str(one.wires), one.link, str(one.number), *areas, "yes" if count <= design.included else "no"))
+    guides = []
+    for number, (link, sheet, _) in enumerate(built):
+        connector = f"{in_mm(sheet.way.connector_length)} from {side_name(sheet.way.side)}"
+        guides.append((str(number), sheet.name, f"[report]({link}/report.md)", connector))
+    head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
+    drawn = [
+        "",
+        "![The robot with its sheets from two sides.](robot.png)",
+        "",
+        "![Touchable area against wires; what is included is filled.](curve.png)",
+    ]
     lines = [
         f"# Skin of {Path(robot).name}",
         "",
@@ -366,40 +375,18 @@ def _write_robot(
         f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
         *_table(head, rows),
-    ]
-    if pictures:
-        lines += ["", "![The robot with its sheets from two sides.](robot.png)"]
-        lines += ["", "![Touchable area against wires; what is included is filled.](curve.png)"]
-    lines += ["", *(f"* {reason}" for reason in (*design.reasons, *larger))]
-    lines += [
+        *(drawn if pictures else ()),
         "",
-        "## Everything to buy or to cut",
-        "",
+        *(f"* {reason}" for reason in (*design.reasons, *larger)),
+        *("", "## Everything to buy or to cut", ""),
         "For all sheets together; each report has the list of its link.",
-    ]
-    lines += ["", *_table(("item", "quantity", "for"), bill_of_materials(named, [one.figures for one in built], beds))]
-    lines += [
         "",
-        "## Order of work",
-        "",
+        *_table(("item", "quantity", "for"), bill_of_materials(sheets, figures, beds)),
+        *("", "## Order of work", ""),
         "Cut all parts, finish every sheet on the bench, then wrap link after link in this order, each by its guide.",
         "",
-    ]
-    guides = [
-        (
-            str(number),
-            one.link,
-            one.sheet.name,
-            f"[report]({one.link}/report.md)",
-            f"{in_mm(one.sheet.way.connector_length)} from {side_name(one.sheet.way.side)}",
-        )
-        for number, one in enumerate(built)
-    ]
-    lines += [
-        *_table(("sensor number", "link", "sheet", "guide", "connector, along the cable"), guides),
-        "",
-        "## Yours to decide",
-        "",
+        *_table(("sensor number", "sheet", "guide", "connector, along the cable"), guides),
+        *("", "## Yours to decide", ""),
         "* Where the boards sit: each sheet has one of its own, and this design ends at its connector. On the link of "
         f"its sheet, no more than the board's cable crosses joints; at the base, {_WIRES_PER_SHEET} wires do.",
         "* How each cable passes the joints between connector and board, with slack for their whole range.",
@@ -409,5 +396,6 @@ def _write_robot(
     ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     written = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
-    data = {"robot": robot, "links": list(dict.fromkeys(one.link for one in built)), "files": [*written, DESIGN_FILE]}
+    links = list(dict.fromkeys(link for link, _, _ in built))
+    data = {"robot": robot, "links": links, "files": [*written, DESIGN_FILE]}
     (folder / DESIGN_FILE).write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
