@@ -10,7 +10,6 @@ face alone.
 
 from __future__ import annotations
 
-import itertools
 import math
 import unicodedata
 from dataclasses import dataclass, replace
@@ -22,9 +21,9 @@ from coneskin.geometry.placed_frustum import PlacedFrustum
 
 from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
-from .outline import Outline, PathSegment, joint_bounds
+from .outline import Outline, circle_outline, joint_bounds
 from .part_labels import PartLabel, part_labels, strip_label
-from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_hole, draw_shape
+from .surface_shape import ShapeCorner, ShapeTab, SurfaceShape, draw_shape, drawing_point
 from .touch_marks import CoverMarks, marks_on_link
 
 
@@ -269,7 +268,8 @@ def nest_sheets(sheets: tuple[CutSheet, ...], gap: float = 10e-3) -> tuple[CutSh
 
 def _border(layout: SheetLayout, surface: Frustum, index: int, overlap: float) -> tuple[Stroke, ...]:
     shape = {1: layout.lower, 3: layout.upper}.get(index, layout.rim)
-    strokes = [Stroke("hole", draw_hole(surface, u, phi, layout.plan.hole)) for u, phi in layout.holes]
+    radius = 0.5 * layout.plan.hole
+    strokes = [Stroke("hole", circle_outline(*drawing_point(surface, *hole), radius)) for hole in layout.holes]
     if overlap:
         slant, wrap = surface.slant, surface.wrap
         flap = ShapeTab(0.5 * slant, wrap, slant, overlap, "edge1")
@@ -330,5 +330,4 @@ def make_test_piece(material: str) -> CutSheet:
 
 def _square(kind: _StrokeKind, half: float) -> Stroke:
     corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
-    sides = [PathSegment(a, b) for a, b in itertools.pairwise([*corners, corners[0]])]
-    return Stroke(kind, Outline.from_segments(sides, True))
+    return Stroke(kind, Outline(tuple((x, y, 0.0) for x, y in corners)))

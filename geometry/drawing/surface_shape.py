@@ -16,7 +16,7 @@ from typing import Literal
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 
-from .outline import FlatPoint, Outline, PathSegment, circle_outline
+from .outline import FlatPoint, Outline, PathSegment
 
 SheetSide = Literal["end1", "end2", "edge0", "edge1"]
 _MIN_CHORD = 1e-9  # m; vertices closer than this are merged
@@ -94,11 +94,6 @@ def draw_shape(frustum: Frustum, shape: SurfaceShape, closed: bool = True) -> Ou
     if closed and outline.area < 0.0:
         return Outline.from_segments([PathSegment(s.end, s.start, -s.bulge) for s in outline.segments()][::-1])
     return outline
-
-
-def draw_hole(frustum: Frustum, u: float, phi: float, diameter: float) -> Outline:
-    """Draw a hole of a diameter [m] about a point of the surface; it is round in the flat pattern."""
-    return circle_outline(*drawing_point(frustum, u, phi), 0.5 * diameter)
 
 
 def _edge(frustum: Frustum, a: ShapeCorner, b: ShapeCorner) -> list[PathSegment]:

@@ -41,7 +41,8 @@ def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin") -> str:
         for kind, colour in LINE_COLOURS.items():
             marks = list(_marks(sheet, kind, left, top))
             if marks:
-                fill, stroke = (_hex(colour), "none") if kind == "label" else ("none", _hex(colour))
+                hue = "#{:02x}{:02x}{:02x}".format(*colour)
+                fill, stroke = (hue, "none") if kind == "label" else ("none", hue)
                 paint = f'fill="{fill}" stroke="{stroke}"'
                 lines.append(f'<g id="{sheet.slug}_{kind}" {paint} stroke-width="0.1">')
                 lines.extend(marks)
@@ -87,10 +88,6 @@ def _text(label: PartLabel, left: float, top: float) -> str:
         f'y="{_number(0.5 * height)}" font-family="Helvetica, Arial, sans-serif" '
         f'font-size="{_number(height / CAP_HEIGHT)}" text-anchor="middle">{escape(label.text)}</text>'
     )
-
-
-def _hex(colour: tuple[int, int, int]) -> str:
-    return "#{:02x}{:02x}{:02x}".format(*colour)
 
 
 def _number(value: float) -> str:

@@ -171,11 +171,11 @@ def _renumbered(notes: Sequence[str], numbers: Sequence[int]) -> Iterator[str]:
     """Yield notes with the seams of those sheets that are left, by their new numbers."""
     for note in notes:
         found = re.match(r"the seams? of sheets? ([\d, and]+) faces? (.*)", note)
+        old = re.findall(r"\d+", found[1]) if found else ()
+        now = [str(numbers.index(int(number)) + 1) for number in old if int(number) in numbers]
         if found is None:
             yield note
-            continue
-        now = [str(numbers.index(int(old)) + 1) for old in re.findall(r"\d+", found[1]) if int(old) in numbers]
-        if now:
+        elif now:
             several = "s" if len(now) > 1 else ""
             yield f"the seam{several} of sheet{several} {' and '.join(now)} face{'' if several else 's'} {found[2]}"
 
@@ -362,12 +362,8 @@ def _write_robot(
         connector = f"{in_mm(sheet.way.connector_length)} from {side_name(sheet.way.side)}"
         guides.append((str(number), sheet.name, f"[report]({link}/report.md)", connector))
     head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
-    drawn = [
-        "",
-        "![The robot with its sheets from two sides.](robot.png)",
-        "",
-        "![Touchable area against wires; what is included is filled.](curve.png)",
-    ]
+    robot_picture = "![The robot with its sheets from two sides.](robot.png)"
+    curve = "![Touchable area against wires; what is included is filled.](curve.png)"
     lines = [
         f"# Skin of {Path(robot).name}",
         "",
@@ -375,7 +371,7 @@ def _write_robot(
         f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
         *_table(head, rows),
-        *(drawn if pictures else ()),
+        *(("", robot_picture, "", curve) if pictures else ()),
         "",
         *(f"* {reason}" for reason in (*design.reasons, *larger)),
         *("", "## Everything to buy or to cut", ""),

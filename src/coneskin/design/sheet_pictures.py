@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
-from coneskin.geometry.drawing.outline import Outline
-from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.drawing.outline import Outline, circle_outline
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, SurfaceShape, draw_shape, drawing_point
 from coneskin.geometry.frustum import Frustum, unroll
 
 from .sheets.sheet_design import SheetDesign
@@ -64,7 +64,7 @@ def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) ->
         style = {"facecolor": FOIL_COLOUR, "alpha": 0.45 if upper else 0.8, "edgecolor": INK_COLOUR, "lw": 0.4}
         axes.fill(*_xy(draw_shape(cone, foil)), label=label, **style)
     for u, phi in layout.holes:
-        hole = _xy(draw_hole(cone, u, phi, layout.plan.hole))
+        hole = _xy(circle_outline(*drawing_point(cone, u, phi), 0.5 * layout.plan.hole))
         axes.fill(*hole, facecolor="white", edgecolor=INK_COLOUR, lw=0.8)
     if layout.holes:  # the legend would show an area as a rectangle
         label = f"registration holes, diameter {1e3 * layout.plan.hole:g} mm"
@@ -80,11 +80,7 @@ def draw_layout(figure: Any, design: SheetDesign, wires: Sequence[SheetWire]) ->
 def _draw_cable(
     axes: Any, design: SheetDesign, cone: Frustum, wires: Sequence[SheetWire]
 ) -> Sequence[tuple[float, float]]:
-    """Draw the wires as they would lie if the link were flat too, on the side of the seam where the cable is.
-
-    Returns:
-        the way of the cable on the drawing [mm], from where the wires meet.
-    """
+    """Draw the wires as if the link were flat too, on the cable's side of the seam, and return its way there [mm]."""
     way = design.way
     ends = way.side.startswith("end")
     off = {"end1": (-1.0, 0.0), "end2": (1.0, 0.0), "edge0": (0.0, -1.0), "edge1": (0.0, 1.0)}[way.side]

@@ -9,7 +9,8 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan, lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
-from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_hole, draw_shape, drawing_point
+from coneskin.geometry.drawing.outline import circle_outline
+from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, draw_shape, drawing_point
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from tests.support.flat_pattern import locate_flat
@@ -132,7 +133,7 @@ def test_holes_go_through_every_layer_and_disturb_nothing(name, side):
     assert len(layout.holes) == 3
     for _, outline, foils, cone in layers(layout):
         for u, phi in layout.holes:
-            ring = dense(draw_hole(cone, u, phi, layout.plan.hole), 0.1e-3)
+            ring = dense(circle_outline(*drawing_point(cone, u, phi), 0.5 * layout.plan.hole), 0.1e-3)
             assert inside(ring, outline).all()
             assert distance(ring, dense(outline)) >= 1e-3 - SLACK
             for foil in foils.values():
