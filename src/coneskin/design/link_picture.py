@@ -303,7 +303,6 @@ def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weight
 
     colours = colormaps["viridis"]
     first = designs[0].place.link_frustum
-    panels = []
     for number, way in enumerate(((0.80, 0.45, 0.35), (-0.80, -0.45, 0.35)), 1):
         axes = figure.add_subplot(1, 2, number)
         view = _View(mesh, first.rotate(way))
@@ -312,8 +311,7 @@ def draw_weights(figure: Any, mesh: Mesh, designs: Sequence[SheetDesign], weight
         for design in designs:
             for u, phi in _border(design)[2]:
                 view.draw_line(axes, *design.outer_face(u, phi), color="#d1495b", lw=1.5)
-        panels.append(axes)
-    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), colours), ax=panels, location="bottom", shrink=0.6)
+    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), colours), ax=figure.axes, location="bottom", shrink=0.6)
     bar.set_label(f"what an area counts by {weights.name}, as a share of the largest; red: the sheets")
 
 

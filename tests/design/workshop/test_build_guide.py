@@ -284,6 +284,14 @@ def test_a_cable_that_leaves_beside_an_end_is_measured_without_a_sign(u: float, 
     assert f"| cable | from edge 0, {said}; the tie" in guide(moved, measure_build(design, 0))
 
 
+@pytest.mark.parametrize("hole", [0.0, 2.5e-3])
+def test_a_sheet_without_pins_says_what_stops_a_mirrored_part(hole: float) -> None:
+    design, figures = built(CONE, plan=ElectrodePlan(hole=hole))
+    text = "\n".join(common_lines([design], [figures]))
+    assert ("The corner beside the lead has no hole: a mirrored part does not fit" in text) == bool(hole)
+    assert ("sides of one name lie over each other" in text) == (not hole)
+
+
 def test_a_link_without_room_at_either_end_carries_its_cable_on_what_is_bolted_to_it() -> None:
     mesh = ending_at(-0.001, 0.062)
     (design,) = design_sheets([PlacedFrustum(Frustum(0.05, 0.05, 0.06))], DesignOptions(), mesh=mesh)

@@ -53,8 +53,8 @@ def _blocked(design: SheetDesign, neighbors: Sequence[SheetDesign], end: int) ->
         sheet = SheetBody(other.place, thickness)
         bodies = (
             (sheet, "it meets the sheet beside it: push it against that"),
-            (other.apron.body(), _WIRES),
-            (other.way.body(), _WIRES),
+            (other.apron.body(), _WIRES_MET),
+            (other.way.body(), _WIRES_MET),
         )
         for body, why in bodies:
             for away in (0.25 * _MIN_LIP, 0.75 * _MIN_LIP):
@@ -218,7 +218,7 @@ _STOP_ROW = 0.25e-3  # m; step by which the end of a lip before what stands out 
 _FLUSH_DISTANCE = 40e-3  # m; an outermost face nearer than this is the datum of the lip
 _MAX_RISE = 8e-3  # m; what stands out further from the cone is not gripped: the lip ends before it
 _MIN_LIP_PIECE = 1e-3  # m; a lip is left out where it would be shorter
-_WIRES = "the tabs or wires of {0} are in the way: mark the line of the rim, and push the sheet against that"
+_WIRES_MET = "the tabs or wires of {0} are in the way: mark the line of the rim, and push the sheet against that"
 _FLUSH_RIM = 0.5e-3  # m; an end so near to the rim is flush with it
 _MIN_LIP = 4e-3  # m; a lip that is shorter everywhere holds nothing
 _SLOT_WIDTH = 4e-3  # m; between the parts, so that the seam is seen and a strap pulls them tight
