@@ -117,7 +117,8 @@ def find_short(frames: Sequence[Frame], sensor: Sensor | None) -> Finding | None
     words = ""
     if sensor is not None and min(middles[_SUPPLY_AT:]) > 0:
         frame = UntouchedZero(sensor).take_off(frames[-1]._replace(**dict(zip(MEASURED, middles, strict=True))))
-        words, matrix = explain_frame(sensor, frame), FrameInversion(sensor).invert(frame[6:18])
+        said, matrix = explain_frame(sensor, frame), FrameInversion(sensor).invert(frame[6:18])
+        words = said if "joined" in said or "stuck" in said else ""
         if matrix is not None and matrix.conductance > _SHORT_SIEMENS:
             off = max(abs(matrix.split), *(min(abs(part), abs(part - 1.0)) for part in (matrix.x, matrix.y)))
             if off < _CORNER:
@@ -125,8 +126,10 @@ def find_short(frames: Sequence[Frame], sensor: Sensor | None) -> Finding | None
     if any(cut):
         words = words or ("A or B joined to ground" if cut[0] else "")
         words = words or (Fault.SHORT_UPPER if cut[1] else Fault.SHORT_LOWER).value
+        if middles[0] + middles[1] > _UNTOUCHED_SHARE * middles[_SUPPLY_AT]:
+            words += "; or it is touched firmly"
         return Cause.SHORT.found(f"a short, a drive current stands at full scale: {words}")
-    return Cause.SHORT.found(f"a short: {words}") if "joined" in words or "stuck" in words else None
+    return Cause.SHORT.found(f"a short: {words}") if words else None
 
 
 _Columns = Sequence[Sequence[int]]

@@ -138,6 +138,19 @@ def test_a_current_at_full_scale_is_a_short_with_a_scene_and_without() -> None:
         assert said in found.value
 
 
+def test_a_current_at_full_scale_of_a_sensor_that_is_touched_may_be_the_touches() -> None:
+    """Two firm contacts far apart join most of a sheet by the other one, though the wire of A is open."""
+    for opened in ((), ("A",)):
+        touches = [ScriptedTouch(0.0, 1.0, u, phi, force=200.0) for u, phi in ((0.2, 0.1), (0.22, 6.1))]
+        faults = FaultInjection(wiring=WiringFaults(opened=opened), wiring_after=0)
+        skin, window = VirtualSkin(SENSOR, touches, model="ladder", faults=faults, duration=0.4), CaptureWindow(0.0)
+        for time, data in skin.packets():
+            window.feed(data, time)
+        found = diagnose(window.capture(0.4), (SENSOR,), None)
+        assert found.item == Cause.SHORT.key
+        assert "shorted, or one of them to ground or supply; or it is touched firmly" in found.value
+
+
 def test_all_currents_at_full_scale_are_the_boards() -> None:
     skin = VirtualSkin(SENSOR, model="ladder", duration=0.4)
     window = CaptureWindow(0.0)
