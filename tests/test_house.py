@@ -25,12 +25,12 @@ FLOORS = (
     "core",
     "core.recording geometry skin.field",
     "geometry.drawing geometry.fit robot.arm robot.sim.urscript skin",
-    "geometry.fit.developable robot.driver robot.reaction robot.sim.motion skin.detection.frame skin.diagnosis "
-    "skin.firmware skin.sources",
+    "geometry.fit.developable robot.driver robot.reaction robot.sim.motion skin.detection.frame skin.firmware "
+    "skin.sources",
     "robot.stop robot.ur skin.virtual",
     "robot.sim.machine scene.values skin.detection.place",
     "scene.tables skin.detection",
-    "design.sheets robot.guard.signals",
+    "design.sheets robot.guard.signals skin.diagnosis",
     "design.workshop robot.guard.motion robot.guard.speed robot.sim.ports",
     "design robot.guard",
     "robot.sim scene",

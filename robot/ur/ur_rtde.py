@@ -56,7 +56,7 @@ _NO_TOOL = [0.0, 0.0, 1e-12, 0.0, 0.0, 0.0]  # m and rad; the wheel sends a pack
 _MAX_STOP_TIME = 3.0  # s; ur_rtde waiting longer for a stop counts as a hang, however gentle the stop is
 
 #: questions to the controller that move nothing, by the wheel's names
-_QUESTION_WORDS = (
+QUESTION_WORDS = (
     *("getForwardKinematics", "getInverseKinematics", "getInverseKinematicsHasSolution", "poseTrans"),
     *("isPoseWithinSafetyLimits", "isJointsWithinSafetyLimits", "getTCPOffset", "getStepTime", "getJointTorques"),
     *("getTargetWaypoint", "getActualJointPositionsHistory", "getActualToolFlangePose", "getTargetJointAccelerations"),
@@ -286,14 +286,14 @@ class UrArm:
         """Return the answer of the controller to a question that moves nothing; nothing may move meanwhile.
 
         Args:
-            name: of the wheel's method, one of ``_QUESTION_WORDS``.
+            name: of the wheel's method, one of ``QUESTION_WORDS``.
             values: its arguments.
 
         Raises:
             RobotRefused: the arm is being moved, or this is no such question.
         """
-        if name not in _QUESTION_WORDS:
-            known = ", ".join(_QUESTION_WORDS)
+        if name not in QUESTION_WORDS:
+            known = ", ".join(QUESTION_WORDS)
             raise RobotRefused(f"{name} is not a question that the arm's driver answers; known: {known}")
         self._stand_for(name)
         with _rtde_errors(name):

@@ -14,8 +14,7 @@ import pytest
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.values import Waypoint
-from coneskin.robot.ur.ur_rtde import _QUESTION_WORDS
-from coneskin.session import ur_rtde_names
+from coneskin.robot.ur.ur_rtde import QUESTION_WORDS
 from coneskin.session.ur_rtde_names import NAMES, REFUSALS, UrRtdeArm
 from tests.support.paths import ROOT
 
@@ -47,7 +46,7 @@ def test_arguments_have_the_wheel_s_names(wheel) -> None:
     import rtde_control
 
     compared = 0
-    for name in set(NAMES) - set(_QUESTION_WORDS):
+    for name in set(NAMES) - set(QUESTION_WORDS):
         for signature in re.findall(
             rf"\b{name}\(self[^,)]*, (.*?)\) ->", getattr(rtde_control.RTDEControlInterface, name, str).__doc__
         ):
@@ -74,10 +73,6 @@ def test_a_name_that_neither_has_is_an_attribute_error(arm) -> None:
     with pytest.raises(AttributeError, match="the arm has no 'moveK', nor has ur_rtde"):
         arm.moveK()
     assert not hasattr(arm, "__fspath__")
-
-
-def test_the_questions_are_those_of_the_driver() -> None:
-    assert ur_rtde_names._ASKED_NAMES == _QUESTION_WORDS
 
 
 def test_what_a_method_is_called_here_exists(arm) -> None:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coneskin.core.errors import RobotRefused
 from coneskin.robot.driver.values import Waypoint
+from coneskin.robot.ur.ur_rtde import QUESTION_WORDS
 
 from .arm_client import ArmClient
 
@@ -232,12 +233,6 @@ _GETTER_VARIABLES = {
     "get" + "".join(word[0].upper() + word[1:] for word in variable.split("_")): variable
     for variable in _READ_VARIABLES.split()
 } | {"getRobotStatus": "robot_status_bits"}
-_ASKED_NAMES = (  # of robot/ur/ur_rtde.py; a test compares
-    *("getForwardKinematics", "getInverseKinematics", "getInverseKinematicsHasSolution", "poseTrans"),
-    *("isPoseWithinSafetyLimits", "isJointsWithinSafetyLimits", "getTCPOffset", "getStepTime", "getJointTorques"),
-    *("getTargetWaypoint", "getActualJointPositionsHistory", "getActualToolFlangePose", "getTargetJointAccelerations"),
-    *("getJacobian", "getJacobianTimeDerivative", "getMassMatrix", "getCoriolisAndCentrifugalTorques"),
-)
 _SPEED_NOTE = (
     f"the arm is stopped where the next call does not come within {_SPEED_HOLD_TIME:g} s, or `time` if that is longer"
 )
@@ -266,7 +261,7 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         ),
         "setTcp": _Method(_true(ArmClient.set_tcp), "set_tcp", "while the arm stands"),
         "setPayload": _Method(_true(_set_payload), "set_payload", "while the arm stands"),
-        **{name: _ask(name) for name in _ASKED_NAMES},
+        **{name: _ask(name) for name in QUESTION_WORDS},
         "isSteady": _Method(
             lambda arm: arm.states.reading().speed < _STEADY_SPEED,
             *("states.reading().speed", f"no joint faster than {_STEADY_SPEED:g} rad/s"),

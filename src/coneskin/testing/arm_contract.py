@@ -31,7 +31,7 @@ _MOTION_SPEED = 0.1  # rad/s of the leading joint, from which on the arm moves
 _STANDSTILL_SPEED = 0.02  # rad/s
 _STANDING_STATES = 25  # in a row
 _MAX_STEP = 0.05  # s from state to state
-_DECELERATION = 4.0  # rad/s2
+_STOP_DECELERATION = 4.0  # rad/s2
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def _check_each_stop_path_stops_the_arm(open_arm: OpenArm) -> None:
             assert set(stops.sockets()) <= set(arm.driver.lost_with), "each socket needs a row in lost_with"
             arm.move()
             arm.wait(reader, standing=False)
-            assert stops.use(path, _DECELERATION), f"{path} was not taken"
+            assert stops.use(path, _STOP_DECELERATION), f"{path} was not taken"
             arm.wait(reader, standing=True)
 
 
@@ -127,7 +127,7 @@ def _check_a_path_that_there_is_not_is_refused(open_arm: OpenArm) -> None:
     """Check that ``use`` tells of a path that the driver does not have."""
     with open_arm() as arm, arm.driver.stop_connections(arm.host, _CHECK_TIMEOUT) as stops:
         for path in frozenset(StopPath) - _paths(arm.driver) - {StopPath.DRIVER, StopPath.WATCHDOG}:
-            assert not stops.use(path, _DECELERATION), f"{path} is in no row of lost_with, and use took it"
+            assert not stops.use(path, _STOP_DECELERATION), f"{path} is in no row of lost_with, and use took it"
 
 
 def _check_nonsense_is_an_error(open_arm: OpenArm) -> None:
@@ -170,7 +170,7 @@ def _check_a_lost_controller_is_an_error_and_stays_one(open_arm: OpenArm) -> Non
                     lost.add(name)
             assert lost == names, f"drain did not tell of {names - lost}"
             assert not stops.reopen(), "reopen must tell that nothing was opened"
-            assert not any(stops.use(path, _DECELERATION) for path in _paths(arm.driver)), "a stop went nowhere"
+            assert not any(stops.use(path, _STOP_DECELERATION) for path in _paths(arm.driver)), "a stop went nowhere"
         _expect_connection_error("state_reader", lambda: arm.driver.state_reader(arm.host, 0.5).__enter__())
         _expect_connection_error("stop_connections", lambda: arm.driver.stop_connections(arm.host, 0.5).__enter__())
 

@@ -86,11 +86,11 @@ def motion_positions(scene: Scene) -> list[tuple[float, ...]]:
     points = scene.motion.waypoints
     lowest = [min(values) for values in zip(*points, strict=True)]
     highest = [max(values) for values in zip(*points, strict=True)]
-    found: list[tuple[float, ...]] = []
-    legs = list(pairwise(points))
-    for a, b in legs:
-        for step in range(21):
-            found.append(tuple(p + (r - p) * step / 20 for p, r in zip(a, b, strict=True)))
+    found = [
+        tuple(p + (r - p) * step / 20 for p, r in zip(*leg, strict=True))
+        for leg in pairwise(points)
+        for step in range(21)
+    ]
     chance = random.Random(0)
     while len(found) < _SAMPLE_COUNT:
         found.append(tuple(chance.uniform(low, high) for low, high in zip(lowest, highest, strict=True)))

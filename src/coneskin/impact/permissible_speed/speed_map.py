@@ -262,7 +262,10 @@ def map_speeds(
         own = anywhere if free else maker.number(patch.link, light, heavy, nearer, held)
         rows.append(LimitedPatch(patch.sensor, patch.u, patch.phi, own, anywhere))
     found = maker.curves
-    _check_speeds(scene, found)
+    for curve in found:
+        if curve.speeds[-1] <= 0.0:
+            why = f"no speed of 1 mm/s or more keeps the limits of {curve.region}: a softer or thicker padding, a"
+            raise SceneError([f"{why} shorter reaction or a harder braking is needed"], scene.name)
     table = SpeedLimitScene(
         fingerprint=limit_fingerprint(scene),
         date=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
@@ -358,13 +361,6 @@ def _check(scene: Scene, limits: LimitsFile) -> None:
                 problems.append(f"no [[limits.region]] may be struck by the {item.name}, which has a skin")
     if problems:
         raise SceneError(problems, scene.name)
-
-
-def _check_speeds(scene: Scene, curves: list[_SpeedCurve]) -> None:
-    for curve in curves:
-        if curve.speeds[-1] <= 0.0:
-            why = f"no speed of 1 mm/s or more keeps the limits of {curve.region}: a softer or thicker padding, a"
-            raise SceneError([f"{why} shorter reaction or a harder braking is needed"], scene.name)
 
 
 _FILE_HEADER = """\

@@ -49,12 +49,12 @@ class DrivenArm:
     deceleration: float = 1.0
 
     def __post_init__(self) -> None:
-        _check("arm.speed", self.speed, "m/s", least=0.0, most=100.0)
-        _check("arm.mass", self.mass, "kg", above=0.0, infinite=True)
-        _check("arm.stiffness", self.stiffness, "N/m", least=0.0)
-        _check("arm.damping", self.damping, "N s/m", least=0.0)
-        _check("arm.reaction", self.reaction, "s", least=0.0, infinite=True)
-        _check("arm.deceleration", self.deceleration, "m/s^2", above=0.0)
+        _check("arm.speed", self.speed, "m/s", most=100.0)
+        _check("arm.mass", self.mass, "kg", above=True, infinite=True)
+        _check("arm.stiffness", self.stiffness, "N/m")
+        _check("arm.damping", self.damping, "N s/m")
+        _check("arm.reaction", self.reaction, "s", infinite=True)
+        _check("arm.deceleration", self.deceleration, "m/s^2", above=True)
 
     @property
     def stopping_way(self) -> float:
@@ -82,10 +82,10 @@ class StruckBody:
     damping: float = 0.0
 
     def __post_init__(self) -> None:
-        _check("body.mass", self.mass, "kg", above=0.0, infinite=True)
-        _check("body.tissue", self.tissue, "N/m", above=0.0, infinite=True)
-        _check("body.support", self.support, "N/m", least=0.0)
-        _check("body.damping", self.damping, "N s/m", least=0.0)
+        _check("body.mass", self.mass, "kg", above=True, infinite=True)
+        _check("body.tissue", self.tissue, "N/m", above=True, infinite=True)
+        _check("body.support", self.support, "N/m")
+        _check("body.damping", self.damping, "N s/m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ class TwoMassContact:
     law: _CompressionLaw = field(init=False)
 
     def __post_init__(self) -> None:
-        _check("closing_force", self.closing_force, "N", least=0.0)
+        _check("closing_force", self.closing_force, "N")
         object.__setattr__(self, "law", _CompressionLaw.of(self.padding, self.body.tissue))
 
     @property
@@ -166,23 +166,12 @@ class TwoMassContact:
 
 
 def _check(
-    name: str,
-    value: float,
-    unit: str,
-    *,
-    least: float = -math.inf,
-    above: float = -math.inf,
-    most: float = math.inf,
-    infinite: bool = False,
+    name: str, value: float, unit: str, *, above: bool = False, most: float = math.inf, infinite: bool = False
 ) -> None:
-    if (
-        isinstance(value, float | int)
-        and (math.isfinite(value) or (infinite and value == math.inf))
-        and value >= least
-        and value > above
-        and value <= most
-    ):
+    """Refuse what is below 0, is 0 where it must be above, or is infinite where it must not be."""
+    known = isinstance(value, float | int) and (math.isfinite(value) or infinite)
+    if known and 0.0 <= value <= most and not (above and value == 0.0):
         return
-    rule = f"above {above:g}" if above > -math.inf else f"at least {least:g}"
+    rule = "above 0" if above else "at least 0"
     rule += f" and at most {most:g}" if most < math.inf else "" if infinite else " and finite"
     raise SensorError(f"{name} must be {rule} {unit}, got {value!r} {unit}")
