@@ -6,6 +6,7 @@ import base64
 import binascii
 import math
 import re
+from array import array
 from collections import Counter
 from collections.abc import Callable
 from itertools import groupby, product
@@ -125,12 +126,10 @@ def find_coding(data: bytes) -> Finding | None:
 
 
 def _swap_words(data: bytes) -> bytes:
-    start = data.find(SYNC[::-1])
-    even = data[max(start, 0) :]
-    even = even[: len(even) // 2 * 2]
-    swapped = bytearray(even)
-    swapped[::2], swapped[1::2] = even[1::2], even[::2]
-    return bytes(swapped)
+    even = data[max(data.find(SYNC[::-1]), 0) :]
+    words = array("H", even[: len(even) // 2 * 2])
+    words.byteswap()
+    return words.tobytes()
 
 
 def undo_slip(data: bytes) -> bytes:

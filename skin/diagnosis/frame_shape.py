@@ -23,7 +23,6 @@ _WIRE_BUFFERS = (32, 64)  # bytes; buffers of common libraries
 _LAST_FIELD = 2  # bytes of the CRC
 _MIN_LENGTH, _MAX_PERIOD = 8, 80
 _PERIODIC_SHARE = 0.35  # share of the bytes that equal the one a frame before
-_HEADER_PLACES = (2, 3)
 
 
 def find_shape(data: bytes) -> Finding | None:
@@ -98,15 +97,13 @@ def find_foreign_sync(data: bytes) -> Finding | None:
     if not period:
         return None
     columns = [Counter(data[place::period]) for place in range(period)]
-    fixed = [column.most_common(1)[0] for column in columns]
-    total = [column.total() for column in columns]
+    fixed = [(*column.most_common(1)[0], column.total()) for column in columns]
     for phase in range(period):
-        version_at, length_at = ((phase + place) % period for place in _HEADER_PLACES)
-        version, length = fixed[version_at][0], fixed[length_at][0]
-        constant = all(fixed[(phase + k) % period][1] >= 0.9 * total[(phase + k) % period] for k in range(4))
+        head = [fixed[(phase + place) % period] for place in range(4)]
+        constant = all(count >= 0.9 * total for _, count, total in head)
+        first, second, version, length = (byte for byte, _, _ in head)
         if constant and version == VERSION and length in FRAME_LENGTHS and period == length:
-            sync = bytes(fixed[(phase + k) % period][0] for k in range(2))
-            return Cause.SYNC_OTHER.found(f"the frames begin with {short_hex(sync)}, not C5 3A")
+            return Cause.SYNC_OTHER.found(f"the frames begin with {short_hex(bytes((first, second)))}, not C5 3A")
     return None
 
 
@@ -189,11 +186,9 @@ def _repair(broken: Sequence[bytes]) -> tuple[Cause, str] | None:
 
 def _missing_bytes(piece: bytes) -> list[int]:
     """Return each byte that makes the checksum right where it is put in somewhere."""
-    found = []
-    for place in range(2, len(piece) + 1):
-        before, behind = piece[:place], piece[place:]
-        start = crc_hqx(before, 0)
-        for byte in (0x11, 0x13, 0x00, 0x0A, 0x0D):
-            if crc_hqx(bytes((byte,)) + behind, start) == 0:
-                found.append(byte)
-    return found
+    return [
+        byte
+        for place in range(2, len(piece) + 1)
+        for byte in (0x11, 0x13, 0x00, 0x0A, 0x0D)
+        if crc_hqx(piece[:place] + bytes((byte,)) + piece[place:], 0) == 0
+    ]
