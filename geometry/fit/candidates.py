@@ -319,7 +319,7 @@ class SampledLink:
         """Return options that allow for noise of the mesh and for faces that it lacks, with a note on each of these."""
         notes, rough, torn = [], self.hull.roughness(), self.mesh.border_share
         if rough > _LEAST_ROUGHNESS:
-            tolerance = min(options.tolerance + _ROUGH_TOLERANCE * rough, MOST_TOLERANCE)
+            tolerance = min(round(options.tolerance + _ROUGH_TOLERANCE * rough, 4), MOST_TOLERANCE)
             notes.append(
                 f"the mesh is rough by {1e3 * rough:.1f} mm (root mean square): what follows its mean within "
                 f"{1e3 * options.tolerance:g} mm is up to {1e3 * tolerance:.1f} mm from it, which is allowed"

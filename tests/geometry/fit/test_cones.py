@@ -235,7 +235,8 @@ def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
     body = make_mesh(hull.points, hull.simplices)
     assert cones(body).sheets == ()
     sheets = find_cones(body, allow_hull=True).sheets
-    assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=2e-4)
+    # as far as the tolerance lets a sheet go over the flats, for a larger one
+    assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=1e-3)
 
 
 @pytest.mark.long
@@ -258,7 +259,8 @@ def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
     corners = corners * [1.0, 1.5, 1.0]
     fit = find_cones(placed((corners, faces)))
     assert fit.sheets == ()
-    assert fit.reason == "no cone fits within 1 mm over a length of 25 mm"
+    assert fit.reason == "no cone fits within 3.4 mm over a length of 25 mm"  # steps all over it count as roughness
+    assert any("rough by 1.2 mm" in note for note in fit.notes)
 
 
 @pytest.mark.long
