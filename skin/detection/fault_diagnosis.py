@@ -190,8 +190,7 @@ def _list_hypotheses(sensor: Sensor) -> list[_WiringHypothesis]:
     plus_lower, minus_lower = "CD" if sensor.c_positive else "DC"
     upper, lower, leak, driven = Fault.SHORT_UPPER, Fault.SHORT_LOWER, Fault.LEAK, Fault.GUIDE_DRIVEN
     found = [_WiringHypothesis(sensor, "nothing", None)]
-    for name in _WIRE_NAMES:
-        found.append(_WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name))
+    found += [_WiringHypothesis(sensor, f"{name} open", Fault[f"OPEN_{name}"], opened=name) for name in _WIRE_NAMES]
     pairs = zip("ABCD", (Fault.OPEN_UPPER, Fault.OPEN_UPPER, Fault.OPEN_LOWER, Fault.OPEN_LOWER), strict=True)
     joints = [(f"{name} joined to the supply", fault, (name, "supply")) for name, fault in pairs]
     joints += [("A joined with B", upper, ("A", "B")), ("C joined with D", lower, ("C", "D"))]
@@ -199,11 +198,9 @@ def _list_hypotheses(sensor: Sensor) -> list[_WiringHypothesis]:
         joints.append((f"{name} joined to ground", fault, (name, "ground")))
     for name, fault in ((plus_upper, driven), (minus_upper, upper), (plus_lower, driven), (minus_lower, lower)):
         joints.append((f"switch of {name} stuck at the supply", fault, (name, "rail")))
-    for first, second in ("AC", "AD", "BC", "BD"):
-        joints.append((f"{first} joined with {second}", Fault.LAYERS_CLOSED, (first, second)))
+    joints += [(f"{a} joined with {b}", Fault.LAYERS_CLOSED, (a, b)) for a in "AB" for b in "CD"]
     found += [_WiringHypothesis(sensor, words, fault, joined=joined) for words, fault, joined in joints]
-    for name in _WIRE_NAMES:
-        fault = Fault.GUIDES_DISAGREE if name in "AB" else leak
+    for name, fault in zip(_WIRE_NAMES, (Fault.GUIDES_DISAGREE, Fault.GUIDES_DISAGREE, leak, leak), strict=True):
         found.append(_WiringHypothesis(sensor, f"input of {name} dead", fault, dead=name))
     return [*found, _WiringHypothesis(sensor, "touch phase dead", driven, dead="touch")]
 

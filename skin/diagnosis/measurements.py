@@ -162,13 +162,11 @@ def _find_zero(columns: _Columns) -> Finding | None:
     radial, angular = (max(columns[k]) <= zero + _ZERO_SLACK for k in (_RADIAL_AT, _ANGULAR_AT))
     if not (radial or angular):
         return None
-    reads = (
-        f"read{'' if radial and angular else 's'} {f'{zero}, as without a current,' if zero > 2 else 0} in every frame"
-    )
+    reads = f"{zero}, as without a current," if zero > 2 else "0"
     if radial and angular:
-        return Cause.CURRENTS_ZERO.found(f"both drive currents {reads}")
-    cause = Cause.RADIAL_CURRENT_ZERO if radial else Cause.ANGULAR_CURRENT_ZERO
-    return cause.found(f"the drive current of the {'radial' if radial else 'angular'} phase {reads}")
+        return Cause.CURRENTS_ZERO.found(f"both drive currents read {reads} in every frame")
+    phase, cause = ("radial", Cause.RADIAL_CURRENT_ZERO) if radial else ("angular", Cause.ANGULAR_CURRENT_ZERO)
+    return cause.found(f"the drive current of the {phase} phase reads {reads} in every frame")
 
 
 def _find_still(columns: _Columns) -> Finding | None:
