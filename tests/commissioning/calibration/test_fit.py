@@ -21,6 +21,8 @@ PAPER = Frustum(0.025, 0.05, 0.0968, 6.0)  # its radii double, as those of the p
 SENSORS = [Sensor(FOREARM), Sensor(PAPER, polarity=Polarity("A", "D"))]
 AFFINE = PlaceMap(FOREARM, (0.004, -0.012, 0.02, 0.0, 0.0, 0.0), (-0.006, 0.02, -0.01, 0.0, 0.0, 0.0))
 BENT = ((0.004, -0.012, 0.0, 0.03, 0.08, -0.06), (-0.006, 0.02, 0.0, -0.05, 0.04, 0.07))
+COATED = ((0.0, 0.0, 0.0, 0.0, 0.17, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, -0.17))  # as few are
+Bends = tuple[tuple[float, ...], tuple[float, ...]]
 PRECISE = 1e-6  # m; marks so well placed that no prior counts
 
 
@@ -59,8 +61,9 @@ def test_offset_gain_and_shear_are_recovered(sensor: Sensor, count: int) -> None
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
-def test_a_bend_is_recovered_where_there_are_enough_touches(sensor: Sensor) -> None:
-    true = PlaceMap(sensor.frustum, *BENT)
+@pytest.mark.parametrize("bends", [BENT, COATED])
+def test_a_bend_is_recovered_where_there_are_enough_touches(sensor: Sensor, bends: Bends) -> None:
+    true = PlaceMap(sensor.frustum, *bends)
     fit = fit_map(sensor, touched(sensor, through(true), 16), PRECISE)
     assert (fit.along, fit.around) == ("offset, gain, shear and bend", "offset, gain, shear and bend")
     assert fit.place_map.along == pytest.approx(true.along, abs=2e-5)
