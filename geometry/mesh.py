@@ -289,7 +289,8 @@ def make_mesh(
         raise MeshError(f"{source}: no face has an area; the points lie on a line")
     used, faces = _numbered_anew(faces, len(welded))
     welded = welded[used]
-    thin = float(np.ptp((welded - welded.mean(axis=0)) @ _principal(welded).T, axis=0).min())
+    centred = welded - welded.mean(axis=0)
+    thin = float(np.ptp(centred @ np.linalg.eigh(centred.T @ centred)[1], axis=0).min())
     if thin < max(MIN_THICKNESS, 1e-4 * longest):
         raise MeshError(
             f"{source}: flat, {longest * 1e3:.4g} mm long and {thin * 1e3:.2g} mm thick; a link must have a volume"
@@ -322,11 +323,6 @@ def _numbered_anew(faces: Ints, count: int) -> tuple[Bools, Ints]:
     used = np.zeros(count, bool)
     used[faces] = True
     return used, (np.cumsum(used) - 1)[faces]
-
-
-def _principal(points: Floats) -> Floats:
-    centred = points - points.mean(axis=0)
-    return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T)
 
 
 def refuse_entities(data: bytes, path: Path) -> None:

@@ -212,8 +212,9 @@ class DriverProcess:
             return False
         if self._waiting and not self._arm.moving():
             self._answer_waiting(ok=True)
-        if now > self._expires:
-            self._expire()
+        if now > self._expires and self._try_to_stop(at_once=False):  # the program has not renewed it
+            what = "no new speed or servo command of the program has come in time: the arm was stopped"
+            self._guard.send(StatusReport("remark", what).encode())
         if now - self._heard > self._patience:
             self._forbid(f"the guard has been silent for {self._patience:g} s")
         self._kick(now)
@@ -261,12 +262,6 @@ class DriverProcess:
         self._answer_waiting(ok=False, stopped=True, why=why)
         self._guard.send(StatusReport("error", why).encode())
         self._try_to_stop()
-
-    def _expire(self) -> None:
-        """Stop what the program has not renewed."""
-        what = "no new speed or servo command of the program has come in time: the arm was stopped"
-        if self._try_to_stop(at_once=False):
-            self._guard.send(StatusReport("remark", what).encode())
 
     def _try_to_stop(self, at_once: bool = True) -> bool:
         try:

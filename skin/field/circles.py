@@ -307,16 +307,15 @@ def green_block(
     Returns:
         the coefficients, and an estimate of the aliasing in them, shape (n,).
     """
-    _, squared, fourier = circle(circles.order, circles.offset.shape[2])
+    zeta, squared, fourier = circle(circles.order, circles.offset.shape[2])
     first, second, weight_i, weight_j, centre = pair_points(
         strip, circles.centres, circles.offset.swapaxes(0, 1), i, j, resistance_a == resistance_b
     )
     if i == j:
         slope = circles.slope[:, i] * np.abs(1.0 + first.direct)
-        taken, put_back = _near_images(strip, circles, i)
+        taken, put_back = _near_images(strip, circles, i, zeta)
         values = kernel(strip, first, second, resistance_a, resistance_b, squared, slope * slope, taken=taken)
     else:
-        zeta, _, _ = circle(circles.order, circles.offset.shape[2])
         alpha, beta = _other_disc(circles.sheet, circles.discs, i, j)
         values = kernel(strip, first, second, resistance_a, resistance_b, _pair_distance(alpha, beta, zeta))
     b = resistance_b / math.pi
@@ -346,11 +345,10 @@ def _aliasing(sampled: Floats, order: int) -> Floats:
     return np.asarray(10.0 * last * np.minimum(last / np.maximum(middle, 1e-300), 1.0) ** 2)
 
 
-def _near_images(strip: Strip, circles: Circles, i: int) -> tuple[Floats | None, Floats | None]:
+def _near_images(strip: Strip, circles: Circles, i: int, zeta: Complex) -> tuple[Floats | None, Floats | None]:
     """Return the near edges' part of A2/A3 on disc i, and the Fourier coefficients of its logarithm."""
     if not circles.images or not circles.images[i]:
         return None, None
-    zeta, _, _ = circle(circles.order, circles.offset.shape[2])
     taken: Floats | None = None
     put_back: Floats | None = None
     for image in circles.images[i]:

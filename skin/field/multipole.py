@@ -111,18 +111,16 @@ def solve_discs(
     discs: Discs,
     order: int,
     points: int | None = None,
-    with_moments: bool = False,
-) -> tuple[Coupling, Floats | None]:
+) -> tuple[Coupling, Floats]:
     """Solve n scenes of k discs at one order; sheet and resistances as of `FieldModel`.
 
     Args:
         discs: the scenes, checked.
         order: M, at least 1.
         points: N on each circle, above 2M; None takes 2M + 2.
-        with_moments: return the moments too (they take memory).
 
     Returns:
-        the coupling, its `error` from how fast the last multipoles die away, and the moments if wanted: of each disc
+        the coupling, its `error` from how fast the last multipoles die away, and the moments: of each disc
             (Q_0, Q_1 cos, Q_1 sin, Q_2 cos, ...) for each unit of h0, hx and hy [S], shape (n, k, 2M+1, 3).
 
     Raises:
@@ -147,7 +145,7 @@ def solve_discs(
     )
     if k == 1:
         block, aliased = green_block(strip, circles, 0, 0, a / rs, b / rs)
-        return _solve_single(block, aliased, d0[:, 0], root[:, 0], circles, rs, order, aspects, with_moments)
+        return _solve_single(block, aliased, d0[:, 0], root[:, 0], circles, rs, order, aspects)
     scale = np.zeros((n, k, size))
     scale[:, :, 1::2] = root
     scale[:, :, 2::2] = root
@@ -187,8 +185,6 @@ def solve_discs(
     norm[:, 0, 1:] = norm[:, 1:, 0] = np.maximum(1.0 / g, 0.0)[:, None]
     tails = [_tail(flat, solved, k * (2 * kept + 1), norm) for kept in _kept(order)]
     coupling = Coupling.of_matrix(w, centre, np.maximum(_truncation(order, *tails), aliasing))
-    if not with_moments:
-        return coupling, None
     return coupling, (solved.reshape(n, size, k, 3) * scale[..., None] / rs).transpose(0, 2, 1, 3)
 
 
@@ -218,8 +214,7 @@ def _solve_single(
     rs: float,
     order: int,
     aspects: tuple[float, float],
-    with_moments: bool,
-) -> tuple[Coupling, Floats | None]:
+) -> tuple[Coupling, Floats]:
     """Solve one disc in each scene; eliminating the total current first keeps even a weak contact exact."""
     n, size = block.shape[0], 2 * order
     scale = np.repeat(root, 2, axis=1)
@@ -244,8 +239,6 @@ def _solve_single(
     error = _truncation(order, *(_tail(inner, solved, 2 * kept, norm) for kept in _kept(order)))
     error = np.maximum(error, aliased * (1.0 / np.abs(spread) + root[:, 0] ** 2))
     coupling = Coupling(1.0 / (rs * spread), x, y, gram[:, 1, 1] / rs, gram[:, 1, 2] / rs, gram[:, 2, 2] / rs, error)
-    if not with_moments:
-        return coupling, None
     values = np.empty((n, 1, size + 1, 3))
     total = coupling.conductance[:, None] * np.stack([np.ones(n), x, y], axis=-1)
     values[:, 0, 0] = total
@@ -267,8 +260,7 @@ def solve_to_tolerance(
         FieldError: even the highest order misses it.
     """
     while True:
-        coupling, moments = solve_discs(sheet, upper_resistance, lower_resistance, discs, order, with_moments=True)
-        assert moments is not None
+        coupling, moments = solve_discs(sheet, upper_resistance, lower_resistance, discs, order)
         if coupling.error[0] <= tolerance:
             return coupling, moments
         if order == LADDER[-1]:

@@ -185,7 +185,7 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     if name not in table:
         raise SensorError(f"board must be one of {', '.join(table)}, got {name!r}")
     board, facts = table[name], BoardFacts(**part_catalog()[name]["facts"])
-    switch, limits = switch_for(sensor)
+    switch, limits = _switch_for(sensor)
     if switch == "low_switch" and facts.logic_volts > 3.3:
         raise SensorError(
             f"{sensor.name} needs switches of half an ohm, whose inputs stand 3.3 V, and the pins of a {facts.title} "
@@ -256,7 +256,7 @@ def _order_numbers(row: Mapping[str, Any], value: str) -> tuple[str, str]:
     return row["number"].format(short=short, long=long), row["second"].format(short=short, long=long)
 
 
-def switch_for(sensor: Sensor) -> tuple[str, dict[str, list[float]]]:
+def _switch_for(sensor: Sensor) -> tuple[str, dict[str, list[float]]]:
     """Return the switches for a sensor's current, by their table in parts.toml, and their limits."""
     catalog, drawn = part_catalog(), 1e3 * max(sensor.radial_amperes, sensor.angular_amperes)
     name = "switch" if drawn <= catalog["switch"]["limits"]["most_ma"][1] else "low_switch"
@@ -300,7 +300,7 @@ def _components(circuit: BoardCircuit) -> Iterator[Component]:
         yield two("R", "resistor", "1 kohm", net, to)
         yield filtered(to, "470 pF", "filter")
     group = "switches"
-    switch = switch_for(circuit.sensor)[0]
+    switch = _switch_for(circuit.sensor)[0]
     supply = "3V3" if switch == "low_switch" else "5V"
     for common, gate in (("RAIL", "HIGH_"), ("GND", "LOW_")):
         channels = {f"S{k}": common for k in (1, 2, 3, 4)} | {f"D{k}": f"DRIVE_{e}" for k, e in enumerate("ABCD", 1)}

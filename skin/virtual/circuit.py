@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal, NamedTuple, Protocol
 
-from coneskin.core.errors import SensorError
+from coneskin.core.errors import SensorError, SkinError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import DrivenPotentials, Frame
 
@@ -32,6 +32,16 @@ class LayerContact(NamedTuple):
     conductance: float  #: between the layers, all of the contact [S]
     radius: float = 0.0  #: of a round contact [m]; 0 for a point
     reach: float = 0.0  #: the radius that it will have at its firmest [m]; 0: this one
+
+
+def _check_place(sensor: Sensor, contact: LayerContact, refusal: type[SkinError]) -> None:
+    """Refuse a contact whose middle is off the sensor, by an error of a type."""
+    cone = sensor.frustum
+    if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
+        raise refusal(
+            f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] rad, "
+            f"got {contact.u!r} m and {contact.phi!r} rad"
+        )
 
 
 class ContactModel(Protocol):
@@ -242,13 +252,8 @@ class ResistorLadder:
         y = [[0.0] * size for _ in range(size)]
         along = [(0.0, _B), (1.0, _A)]
         around = [(0.0, _D), (1.0, _C)]
-        cone = sensor.frustum
         for k, contact in enumerate(contacts):
-            if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
-                raise SensorError(
-                    f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] "
-                    f"rad, got {contact.u!r} m and {contact.phi!r} rad"
-                )
+            _check_place(sensor, contact, SensorError)
             if not contact.conductance >= 0.0:
                 raise SensorError(f"contact.conductance must not be negative, got {contact.conductance!r} S")
             radial, angular = sensor.fractions(contact.u, contact.phi)

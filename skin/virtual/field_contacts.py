@@ -28,7 +28,7 @@ from coneskin.skin.field.multipole import resolution, solve_to_tolerance
 from coneskin.skin.field.sheet import SectorSheet
 from coneskin.skin.sensor import Sensor
 
-from .circuit import LayerContact, Matrix, ResistorLadder
+from .circuit import LayerContact, Matrix, ResistorLadder, _check_place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,12 +155,7 @@ class FieldContacts:
         self.admittances(sensor, [[contact]])
 
     def _checked(self, sensor: Sensor, contact: LayerContact) -> LayerContact:
-        cone = sensor.frustum
-        if not (0.0 <= contact.u <= cone.slant and 0.0 <= contact.phi <= cone.wrap):
-            raise FieldError(
-                f"a contact must lie on {sensor.name}: u in [0, {cone.slant:g}] m and phi in [0, {cone.wrap:g}] rad, "
-                f"got {contact.u!r} m and {contact.phi!r} rad"
-            )
+        _check_place(sensor, contact, FieldError)
         if not 0.0 <= contact.conductance < math.inf:
             raise FieldError(f"conductance of a contact must be 0 or more and finite [S], got {contact.conductance!r}")
         radius = contact.radius or _POINT_RADIUS

@@ -92,10 +92,10 @@ def read_designs(folder: Path) -> tuple[DesignFolder, ...]:
         names = [str(name) for name in read_json(read_file(folder / DESIGN_FILE, _MAX_BYTES)).get("links", ())]
     except (OSError, ValueError, TypeError, AttributeError):
         names = []
-    return tuple(read_design(folder / name) for name in names) or (read_design(folder),)
+    return tuple(_read_design(folder / name) for name in names) or (_read_design(folder),)
 
 
-def read_design(folder: Path) -> DesignFolder:
+def _read_design(folder: Path) -> DesignFolder:
     """Read the design of a link.
 
     Raises:

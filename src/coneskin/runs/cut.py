@@ -81,14 +81,6 @@ class _CutRun:
     other_reaction: str
 
 
-def _first_touch(run: Run) -> float:
-    """Return when the first touch of a run was seen [s since the start of the run]."""
-    for event in run.events:
-        if event.name == EventName.CONTACT:
-            return event.time - run.start
-    raise RecordingError("no touch was seen in the run: name the moment that is cut out, with --around")
-
-
 def cut_run(
     run: Run, target: Path, around: float | None, keep: float | None = None, name: str = "", progress: Progress = silent
 ) -> _CutRun:
@@ -104,7 +96,10 @@ def cut_run(
         RecordingError: there is nothing at that moment, no contact, or the contacts would be others than in the whole
             run; or the file is there already.
     """
-    around = _first_touch(run) if around is None else around
+    if around is None:
+        around = next((event.time - run.start for event in run.events if event.name == EventName.CONTACT), None)
+    if around is None:
+        raise RecordingError("no touch was seen in the run: name the moment that is cut out, with --around")
     length = _KEPT_TIME if keep is None else keep
     if not (math.isfinite(around) and math.isfinite(length) and length > 0.0):
         raise RecordingError(f"a cut needs a moment [s] and a duration above 0 s, got {around!r} s and {length!r} s")

@@ -10,8 +10,8 @@ from coneskin.commissioning.examination.wires import (
     READING_NAMES,
     WIRINGS,
     TouchReadings,
-    Wiring,
     _identify,
+    _Wiring,
     touch_places,
 )
 from coneskin.geometry.frustum import Frustum
@@ -39,7 +39,7 @@ def sheets(number: int, name: str) -> Matrix:
     return FieldContacts().admittances(sensor, [(contact,)])[0]
 
 
-def readings(number: int, wiring: Wiring) -> dict[str, TouchReadings]:
+def readings(number: int, wiring: _Wiring) -> dict[str, TouchReadings]:
     """What a sensor reads that is wired so, rounded to counts."""
     sensor = SENSORS[number]
     driven = replace(sensor, polarity=Polarity("B", "D" if wiring.angular_turned else "C"))
@@ -58,12 +58,12 @@ def readings(number: int, wiring: Wiring) -> dict[str, TouchReadings]:
 
 def test_there_are_24_orders_and_the_right_one_is_first() -> None:
     assert len(set(ORDERS)) == 24
-    assert WIRINGS[0] == Wiring("ABCD", False)
+    assert WIRINGS[0] == _Wiring("ABCD", False)
     assert len(set(WIRINGS)) == 48
 
 
 def test_an_order_is_named() -> None:
-    assert _identify(SENSORS[0], readings(0, Wiring("DBCA", False))).wiring == Wiring("DBCA", False)
+    assert _identify(SENSORS[0], readings(0, _Wiring("DBCA", False))).wiring == _Wiring("DBCA", False)
 
 
 @pytest.mark.long
@@ -71,11 +71,11 @@ def test_an_order_is_named() -> None:
 def test_every_order_is_named(wires: str) -> None:
     """On one sensor or the other, and with C or D driven, by turns."""
     number, turned = ORDERS.index(wires) % 2, ORDERS.index(wires) % 4 > 1
-    assert _identify(SENSORS[number], readings(number, Wiring(wires, turned))).wiring == Wiring(wires, turned)
+    assert _identify(SENSORS[number], readings(number, _Wiring(wires, turned))).wiring == _Wiring(wires, turned)
 
 
 def test_which_of_c_and_d_the_firmware_drives_is_told_from_their_wires() -> None:
-    assert _identify(SENSORS[1], readings(1, Wiring("ABDC", True))).wiring == Wiring("ABDC", True)
+    assert _identify(SENSORS[1], readings(1, _Wiring("ABDC", True))).wiring == _Wiring("ABDC", True)
 
 
 def test_touches_of_one_place_alone_are_not_explained() -> None:

@@ -22,7 +22,7 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
 from coneskin.skin.detection.events import SkinFault
 from coneskin.skin.electronics import SENSE_GAIN
-from coneskin.skin.firmware.board_circuit import BoardCircuit, board_circuit, switch_for
+from coneskin.skin.firmware.board_circuit import BoardCircuit, _switch_for, board_circuit
 from coneskin.skin.firmware.boards import part_catalog
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import LayerContact, frame_of
@@ -82,7 +82,7 @@ def volts_seen(circuit: BoardCircuit, rng: np.random.Generator, offset: float | 
     catalog = part_catalog()
     limits = {name: table["limits"] for name, table in catalog.items()}
     parts = circuit.sensor.electronics
-    switch = switch_for(circuit.sensor)[1]
+    switch = _switch_for(circuit.sensor)[1]
     precise = limits["precise"]["error_percent"]
     length = rng.uniform(0.3, 3.0)
     wire = length * 0.145 + rng.uniform(0.2, 1.2, 4)  # with bead, plug and foil

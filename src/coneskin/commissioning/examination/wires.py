@@ -51,7 +51,7 @@ READING_NAMES = ConverterInputs._fields[:9]
 TouchReadings = tuple[float, ...]
 
 
-class Wiring(NamedTuple):
+class _Wiring(NamedTuple):
     """One way in which a sensor may be wired."""
 
     wires: str  #: electrodes on the terminals A, B, C, D
@@ -61,14 +61,14 @@ class Wiring(NamedTuple):
 class _WireVerdict(NamedTuple):
     """Answer, and how sure it is."""
 
-    wiring: Wiring | None  #: None where none explains what was read, or two do
-    likely: tuple[Wiring, Wiring]  #: the best and the next best
+    wiring: _Wiring | None  #: None where none explains what was read, or two do
+    likely: tuple[_Wiring, _Wiring]  #: the best and the next best
     misfit: float  #: root mean square of the differences, in errors of the model
     second: float  #: that of the next best
 
 
 #: every hypothesis, the right one first
-WIRINGS = tuple(Wiring(wires, turned) for wires in _ORDERS for turned in (False, True))
+WIRINGS = tuple(_Wiring(wires, turned) for wires in _ORDERS for turned in (False, True))
 
 
 def touch_places(sensor: Sensor) -> dict[str, tuple[float, float]]:
@@ -103,14 +103,14 @@ class _Touch:
         polarity = replace(sensor.polarity, angular="D" if sensor.c_positive else "C")
         self._driven = {False: sensor, True: replace(sensor, polarity=polarity)}
         self._sheets = cache(self._admittance)
-        self._siemens: dict[Wiring, float] = {}
+        self._siemens: dict[_Wiring, float] = {}
 
-    def rough(self, wiring: Wiring) -> float:
+    def rough(self, wiring: _Wiring) -> float:
         """Return the sum of squares at the best conductance."""
         self._siemens[wiring] = min(_TOUCH_SIEMENS, key=lambda siemens: self._squares(wiring, 0.0, 0.0, siemens))
         return self._squares(wiring, 0.0, 0.0, self._siemens[wiring])
 
-    def fine(self, wiring: Wiring) -> float:
+    def fine(self, wiring: _Wiring) -> float:
         """Return the same at the best place as well, by a search along its axes; ``rough`` was called before."""
         at = (0.0, 0.0, self._siemens[wiring])
         best, step = self._squares(wiring, *at), _PLACE_ERROR
@@ -129,7 +129,7 @@ class _Touch:
                 step *= 0.5
         return best
 
-    def _squares(self, wiring: Wiring, along: float, around: float, siemens: float) -> float:
+    def _squares(self, wiring: _Wiring, along: float, around: float, siemens: float) -> float:
         sensor, parts = self._driven[wiring.angular_turned], self._sensor.electronics
         sheets = reorder(self._sheets(along, around, siemens), _ORDER_INDICES[wiring.wires])
         at = measure(sensor, (sheets, sheets, sheets))

@@ -252,13 +252,10 @@ class _Integration:
         self.pace = reach(series, self.tolerance)
         h = min(self.pace, room)
         self.calm += 1
-        self.faded += 0.5 * h * self._friction(start.elastic)
+        pad, arm, body = self.law.loss * start.elastic, self.model.arm, self.model.body
+        slowing = (arm.damping + pad) / arm.mass + (body.damping + pad) / body.mass  # of the fastest motion [1/s]
+        self.faded += 0.5 * h * slowing
         return series, h, None
-
-    def _friction(self, elastic: float) -> float:
-        """Return the rate at which the fastest motion loses speed [1/s]."""
-        pad, arm, body = self.law.loss * elastic, self.model.arm, self.model.body
-        return (arm.damping + pad) / arm.mass + (body.damping + pad) / body.mass
 
     def _by_collocation(self, room: float) -> _Step | None:
         """Return a step of many times the length, where the fastest motion has died away; None where it has not."""

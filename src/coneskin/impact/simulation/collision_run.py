@@ -212,7 +212,10 @@ class CollisionRun:
         self._steps += 1
         first = self._steps % 2 == 1  # half of a control cycle
         while self._commands and self._commands[0][0] <= self._steps:
-            self._obey(self._commands.popleft()[1])
+            command = self._commands.popleft()[1]
+            if not isinstance(command, SetSpeedSlider | JointVelocitySetpoint):
+                self._program = None
+            self.arm.feed(command)
         if first:
             self._drive()
             self.arm.update()
@@ -235,11 +238,6 @@ class CollisionRun:
             self._program = None
         else:
             self.arm.go(list(wanted[0]), wanted[1])
-
-    def _obey(self, command: object) -> None:
-        if not isinstance(command, SetSpeedSlider | JointVelocitySetpoint):
-            self._program = None
-        self.arm.feed(command)
 
     def _send(self, command: object, late: int) -> None:
         self.meter.notice(self.now)
