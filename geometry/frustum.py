@@ -25,6 +25,15 @@ if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
 
 
+def _take_sizes(shape: object, names: tuple[str, ...], unit: str = "") -> None:
+    """Make sizes of a shape plain floats, and refuse what is negative or not finite."""
+    for name in names:
+        value = getattr(shape, name)
+        if not (math.isfinite(value) and value >= 0.0):
+            raise GeometryError(f"{name} must be finite and not negative, got {value!r}{unit}")
+        object.__setattr__(shape, name, float(value))
+
+
 @dataclass(frozen=True, slots=True)
 class Frustum:
     """The side of a truncated cone about the z axis: end 1 at z = 0, end 2 at z = height.
@@ -45,11 +54,7 @@ class Frustum:
     wrap: float = math.tau
 
     def __post_init__(self) -> None:
-        for name in ("radius1", "radius2", "height"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise GeometryError(f"{name} must be finite and not negative, got {value!r} m")
-            object.__setattr__(self, name, float(value))
+        _take_sizes(self, ("radius1", "radius2", "height"), " m")
         if not 0.0 < self.wrap <= math.tau:
             raise GeometryError(f"wrap must be above 0 and at most a full turn (2 pi rad), got {self.wrap!r} rad")
         object.__setattr__(self, "wrap", float(self.wrap))
@@ -183,11 +188,7 @@ class Sector:
     theta0: float
 
     def __post_init__(self) -> None:
-        for name in ("slant", "arc1", "arc2", "theta0"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise GeometryError(f"{name} must be finite and not negative, got {value!r}")
-            object.__setattr__(self, name, float(value))
+        _take_sizes(self, ("slant", "arc1", "arc2", "theta0"))
         if self.slant == 0.0 or self.arc1 == self.arc2 == 0.0:
             raise GeometryError(f"a sector needs a slant and an arc above 0 m, got slant {self.slant!r} m")
         if self.theta0 > 2.0 * math.pi:

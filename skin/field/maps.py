@@ -50,19 +50,17 @@ class FieldMap:
             FieldError: a contact that cannot be, a tolerance that multipoles cannot meet, or a sheet that floats.
         """
         sheet = model.sheet
-        if not discs:
+        if discs:
+            scene = Discs.of(discs)
+            check_discs(sheet, scene)
+            # The readings are stationary in the moments, the potentials are not.
+            tolerance = max(1e-3 * model.tolerance, 1e-15)
+            order = int(resolution(sheet, scene, model.contrast, tolerance)[0])
+            ohms = model.upper_resistance, model.lower_resistance
+            coupling, moments = solve_to_tolerance(sheet, *ohms, scene, order, tolerance)
+        else:
             ghost = Disc(0.5 * sheet.width, 0.5 * sheet.wrap, 1e-3 * min(sheet.width, sheet.arc), 0.0)
-            read = model.read(model.discs([ghost]), phase)
-            a, b, c, d = (float(v) for v in read.electrodes[0])
-            return cls(model, (), (a, b, c, d), np.zeros((0, 3)))
-        scene = Discs.of(discs)
-        check_discs(sheet, scene)
-        # The readings are stationary in the moments, the potentials are not.
-        tolerance = max(1e-3 * model.tolerance, 1e-15)
-        order = int(resolution(sheet, scene, model.contrast, tolerance)[0])
-        coupling, moments = solve_to_tolerance(
-            sheet, model.upper_resistance, model.lower_resistance, scene, order, tolerance
-        )
+            coupling, moments = model.discs([ghost]), np.zeros((1, 0, 3, 3))
         a, b, c, d = (float(v) for v in model.read(coupling, phase).electrodes[0])
         return cls(model, tuple(discs), (a, b, c, d), moments[0] @ np.array([b - d, a - b, d - c]))
 

@@ -25,10 +25,8 @@ def make_figure(width: float, height: float, columns: int = 1) -> tuple[Any, lis
         MissingExtra: matplotlib is not installed.
     """
     with needed_package("matplotlib", "drawing the field", "pictures"):
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
     return figure, [figure.add_subplot(1, columns, number + 1) for number in range(columns)]
 
 

@@ -56,7 +56,7 @@ def test_an_arm_that_asks_for_too_much_meets_the_hand_with_less_than_the_limit(
     for name, one in (("free", scene), ("limited", limited)):
         run = CollisionRun(one, [HAND], START)
         run.run(lambda _: ((1.4, 0.0, 0.0, 0.0, 0.0, 0.0), 2.0), longest=4.0)
-        peaks[name] = run.outcome.peak
+        peaks[name] = run.meter.outcome.peak
         assert run.event(EventName.CONTACT) is not None
         assert (run.event(EventName.SPEED_LIMITED) is not None) is (name == "limited")
     assert peaks["free"] > 100.0

@@ -44,7 +44,7 @@ def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_t
     blocks: list[Block] = []
     scene = scene_of("stop")
     run = collide(scene, note=blocks.append)
-    contact, outcome = run.event(EventName.CONTACT_LOCATED), run.outcome
+    contact, outcome = run.event(EventName.CONTACT_LOCATED), run.meter.outcome
     assert contact is not None
     assert contact.details["u"] == pytest.approx(0.13, abs=0.01)
     assert contact.details["phi"] == pytest.approx(math.pi / 2.0, abs=0.1)
@@ -52,7 +52,7 @@ def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_t
     assert 0.0 < outcome.noticed <= 0.003  # 2 N after the first millisecond, of which the foam shows half at once
     assert 0.1 < outcome.standstill < 0.2  # 1 rad/s at 10 rad/s2, and the latencies
     assert 50.0 < outcome.clamp < outcome.peak
-    unprotected = collide(scene, protection="nothing").outcome
+    unprotected = collide(scene, protection="nothing").meter.outcome
     assert unprotected.clamp > 5.0 * outcome.clamp
     assert math.isnan(unprotected.noticed)
 
@@ -81,14 +81,14 @@ def test_the_same_seed_gives_the_same_run_bit_by_bit() -> None:
     second: list[Block] = []
     one = collide(scene_of("retreat"), note=first.append)
     other = collide(scene_of("retreat"), note=second.append)
-    assert one.outcome == other.outcome
+    assert one.meter.outcome == other.meter.outcome
     assert first == second
     assert one.plant.q == other.plant.q
 
 
 @pytest.mark.long
 def test_moving_away_takes_the_force_off_that_a_stop_leaves() -> None:
-    stop, retreat, comply = (collide(scene_of(kind)).outcome for kind in ("stop", "retreat", "comply"))
+    stop, retreat, comply = (collide(scene_of(kind)).meter.outcome for kind in ("stop", "retreat", "comply"))
     assert stop.peak == pytest.approx(retreat.peak, rel=1e-6)  # until it stands, all brake alike
     assert retreat.clamp < 0.8 * stop.clamp
     assert comply.clamp < stop.clamp - 14.0  # it rests once 15 N are gone, which what stands behind may carry
@@ -97,11 +97,11 @@ def test_moving_away_takes_the_force_off_that_a_stop_leaves() -> None:
 @pytest.mark.long
 def test_a_force_limit_stops_what_presses_with_more_and_lets_less_be() -> None:
     scene = scene_of("stop")
-    hard = collide(scene, replace(HAND, stiffness=20e3), protection="force limit").outcome
+    hard = collide(scene, replace(HAND, stiffness=20e3), protection="force limit").meter.outcome
     assert hard.noticed > 0.01  # not before the force is there
     assert hard.peak > 150.0
     assert hard.standstill > hard.noticed
-    light = collide(scene, replace(HAND, stiffness=500.0), protection="force limit").outcome
+    light = collide(scene, replace(HAND, stiffness=500.0), protection="force limit").meter.outcome
     assert math.isnan(light.noticed)
     assert light.peak < 150.0
 
@@ -110,7 +110,7 @@ def test_a_force_limit_stops_what_presses_with_more_and_lets_less_be() -> None:
 def test_below_the_force_that_closes_the_layers_nothing_is_felt() -> None:
     feather = replace(HAND, kind="mass", mass=0.0003, stiffness=0.0)  # at 0.2 m/s: v sqrt(k m) = 0.35 N
     run = collide(scene_of("stop"), feather)
-    assert 0.05 < run.outcome.peak < 0.5
+    assert 0.05 < run.meter.outcome.peak < 0.5
     assert run.event(EventName.CONTACT) is None
 
 
@@ -120,4 +120,4 @@ def test_a_press_beside_the_active_area_is_not_felt() -> None:
     text = forearm_scene(reaction='kind = "stop"').replace("height_mm = 260", "height_mm = 260\nwrap_deg = 60")
     run = collide(commissioned(parse_scene(text)))
     assert run.event(EventName.CONTACT) is None
-    assert run.outcome.peak > 200.0
+    assert run.meter.outcome.peak > 200.0

@@ -165,11 +165,6 @@ class CollisionRun:
         self._truth, self._touches = TruthRecorder(_STEP_TIME), TouchRecorder()
 
     @property
-    def outcome(self) -> ImpactOutcome:
-        """Outcome so far."""
-        return self.meter.outcome
-
-    @property
     def latched(self) -> bool:
         """True while the guard holds the arm latched."""
         return self._core is not None and self._core.phase is Phase.LATCHED
@@ -205,7 +200,7 @@ class CollisionRun:
                 break
             if self.meter.over:
                 left = min(left, after) - _STEP_TIME
-        return self.outcome
+        return self.meter.outcome
 
     def _step(self, moving: bool = True) -> None:
         self.now += _STEP_TIME
