@@ -51,7 +51,7 @@ def record_long_run(path: Path, model: Path, seconds: float) -> None:
                 swing = 0.0 if due > touch.start + 0.02 else 0.5
                 q = [-0.7, -1.6, 1.6, -1.6, -1.6, 0.2 * math.sin(due)]
                 qd = [swing, 0.0, 0.0, 0.0, 0.0, 0.2 * math.cos(due) if swing else 0.0]
-                values = [[x + noise.gauss(0.0, 1e-5) for x in row] for row in (q, qd, [1.0] * 6, [1.0] * 6)]
+                values = [tuple([x + noise.gauss(0.0, 1e-5) for x in row]) for row in (q, qd, [1.0] * 6, [1.0] * 6)]
                 state = STATE_RECIPE.pack([due, values[0], values[1], 7, 1, 2, values[2], values[3]])
                 take(BlockKind.ARM, _START_TIME + due, state)
                 due += 0.002
