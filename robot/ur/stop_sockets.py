@@ -35,7 +35,6 @@ from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.tcp import TcpStops
 from coneskin.robot.driver.values import SetpointProgram, StopPath
 
-from .input_writers import program_text, set_slider
 from .rtde_codec import RobotMode
 from .rtde_connection import RtdeConnection
 
@@ -197,6 +196,8 @@ class StopSockets(TcpStops):
         if path is StopPath.COMMAND:
             return self.send("command", b"stop\n")
         if path is StopPath.SLIDER:
+            from .input_writers import set_slider
+
             return set_slider(self.host, 0.0, _SLIDER_TIMEOUT)
         if path is StopPath.PROTECTIVE:
             return self.run(_PROTECTIVE_PROGRAM)
@@ -204,6 +205,8 @@ class StopSockets(TcpStops):
 
     def follow(self, program: SetpointProgram) -> bool:
         """Start the program that follows setpoints, without waiting; return whether the system took the bytes."""
+        from .input_writers import program_text  # no part of a scene that only stops
+
         return self.run(program_text(program))
 
     def run(self, program: str) -> bool:

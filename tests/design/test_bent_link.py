@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -124,7 +125,11 @@ def test_a_touch_on_an_oval_link_is_found_on_the_oval(tmp_path: Path) -> None:
     (sheet,) = design.sheets
     report = (tmp_path / "skin" / "report.md").read_text(encoding="utf-8")
     assert "general cylinder" in report
-    assert "the link is not round: cones cover 0% of its hull, with a general cylinder it is" in report
+    said = re.search(
+        r"the link is not round: cones cover (\d+)% of its hull, with a general cylinder it is (\d+)%", report
+    )
+    assert said is not None
+    assert int(said[1]) < 0.5 * int(said[2])
     assert len(design.data["sheets"][0]["bends"]) > 8
     text = '[[link]]\nname = "shell"\n[[link.sensor]]\nfile = "skin/sensor.toml"\n[source]\nkind = "virtual"\n'
     (tmp_path / "scene.toml").write_text(text)
