@@ -20,6 +20,7 @@ from coneskin.skin.detection.place.single_contact import (
 )
 from coneskin.skin.electronics import Electronics, LeadOhms, Polarity
 from coneskin.skin.sensor import Sensor
+from coneskin.skin.tolerance import IDEAL_SHEETS
 from coneskin.skin.virtual.circuit import ContactModel, LayerContact, ResistorLadder, measure
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from coneskin.skin.virtual.imperfections import ContactLaw
@@ -128,8 +129,8 @@ def test_one_contact_is_soon_certain(shape):
     force=st.floats(2.0, 40.0),
 )
 def test_no_single_disc_is_doubted(shape, along, around, radius, force):
-    """The law: wherever a disc of up to 15 mm lies, it adds equally in all directions."""
-    sensor = Sensor(SHAPES[shape])
+    """The law: wherever a disc of up to 15 mm lies, it adds equally in all directions. Sheets are another doubt."""
+    sensor = Sensor(SHAPES[shape], tolerance=IDEAL_SHEETS)
     radius = min(radius, 1.1 * DANGEROUS_ANGLE * sensor.frustum.radius1)  # a wider one is as a ring of 20 deg
     u = 1.05 * radius + along * (sensor.frustum.slant - 2.1 * radius)
     edge = 1.05 * radius / sensor.frustum.radius_at(u)
