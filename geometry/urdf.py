@@ -92,9 +92,14 @@ def urdf_joints(
     packages: Mapping[str, str | Path] | None = None,
     arguments: Mapping[str, str] | None = None,
 ) -> tuple[UrdfJoint, ...]:
-    """Return the joints of a URDF, one that slides where it is nearest to 0; arguments and errors of ``urdf_links``."""
+    """Return the joints of a URDF, one that slides where it is nearest to 0; arguments of ``urdf_links``.
+
+    Raises:
+        MeshError: as ``urdf_links``; limits exchanged, a link that is not there, or joints that are no tree.
+    """
     joints = []
-    for joint in _robot(Path(path), packages, arguments).iter("joint"):
+    robot = _robot(Path(path), packages, arguments)
+    for joint in robot.iter("joint"):
         kind, parent, child = joint.get("type", ""), joint.find("parent"), joint.find("child")
         if parent is None or child is None or kind not in ("revolute", "continuous", "fixed", "prismatic"):
             continue
@@ -104,6 +109,8 @@ def urdf_joints(
         lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
         if kind in ("revolute", "prismatic") and limit is not None:
             lower, upper, _ = _numbers(f"{limit.get('lower', 0)} {limit.get('upper', 0)} 0", f"{name}: limit")
+            if not lower <= upper:
+                raise MeshError(f"{name}: the lower limit must not be above the upper, got {lower:g} and {upper:g}")
         length = math.hypot(*way) or 1.0
         unit = way[0] / length, way[1] / length, way[2] / length
         origin = _origin(joint, f"joint {joint.get('name')}", path)
@@ -113,6 +120,15 @@ def urdf_joints(
         elif upper - lower > math.tau:
             lower, upper = -math.pi, math.pi
         joints.append(UrdfJoint(parent.get("link", ""), child.get("link", ""), origin, unit, lower, upper))
+    children, reached = [joint.child for joint in joints], link_poses(joints, [0.0] * len(joints))
+    if stray := {end for joint in joints for end in (joint.parent, joint.child)} - {
+        x.get("name") for x in robot.iter("link")
+    }:
+        raise MeshError(f"{path}: a joint holds {min(stray)!r}, and no link of the file has that name")
+    if twice := [child for child in children if children.count(child) > 1 or child not in reached]:
+        raise MeshError(
+            f"{path}: joints form a tree, so none may close a ring or lead to a link again; {twice[0]!r} does"
+        )
     return tuple(joints)
 
 

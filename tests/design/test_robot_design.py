@@ -13,7 +13,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from coneskin.cli import main
-from coneskin.core.errors import GeometryError
+from coneskin.core.errors import GeometryError, MeshError
 from coneskin.design.first_scene import _virtual, read_designs
 from coneskin.design.robot_design import _outside, _renumbered, design_robot
 from coneskin.design.sheets.cable_way import SheetBody
@@ -66,6 +66,14 @@ def test_a_joint_has_its_place_its_unit_axis_and_no_more_than_a_turn(tmp_path: P
     assert (joint.parent, joint.child, joint.axis) == ("upper_arm_link", "forearm_link", (0.0, 0.0, 1.0))
     assert joint.origin == Pose()
     assert (joint.lower, joint.upper) == (-math.pi, math.pi)
+
+
+def test_a_robot_of_which_a_link_cannot_be_read_is_refused(tmp_path: Path) -> None:
+    robot = write_robot(tmp_path, 0.1)
+    (tmp_path / "first.stl").unlink()
+    with pytest.raises(MeshError, match=r"upper_arm_link: .*first\.stl.*every link is read"):
+        design_robot(robot, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.long

@@ -150,3 +150,22 @@ def test_a_link_whose_name_is_no_folder_of_its_own_is_refused(tmp_path: Path, na
     file.write_text(f"<robot name='r'>{''.join(map(link.format, names))}</robot>")
     with pytest.raises(MeshError, match="the name of a link must be its own"):
         urdf_links(file)
+
+
+@pytest.mark.parametrize(
+    ("joints", "limit", "words"),
+    [
+        ("ab bc ca", "", "joints form a tree.*'b' does"),
+        ("ab cb", "", "joints form a tree.*'b' does"),
+        ("aa", "", "joints form a tree.*'a' does"),
+        ("ab bd", "", "no link of the file has that name"),
+        ("ab", '<limit lower="1" upper="-1"/>', "got 1 and -1"),
+        ("ab", '<limit lower="nan" upper="1"/>', "got nan and 1"),
+    ],
+)
+def test_joints_that_are_no_tree_are_refused(tmp_path: Path, joints: str, limit: str, words: str) -> None:
+    file, joint = tmp_path / "r.urdf", '<joint name="j" type="revolute"><parent link="{}"/><child link="{}"/>{}</joint>'
+    bodies = "".join(joint.format(*pair, limit) for pair in joints.split())
+    file.write_text(f"<robot name='r'><link name='a'/><link name='b'/><link name='c'/>{bodies}</robot>")
+    with pytest.raises(MeshError, match=words):
+        urdf_joints(file)

@@ -203,7 +203,7 @@ def design_robot(
         options, packages, arguments, files, pictures, replace, progress, search: as those of ``design_link``.
 
     Raises:
-        MeshError: the file cannot be read.
+        MeshError: the file or the mesh of a link cannot be read, or the joints are no tree.
         GeometryError: no link can carry a sheet, wires allow none, or the folder is in use; nothing is written then.
     """
     options = options or DesignOptions()
@@ -211,19 +211,19 @@ def design_robot(
     meshes: dict[str, Mesh] = {}
     found: dict[str, LinkDesign] = {}
     reasons: list[str] = []
+    joints = urdf_joints(robot, packages, arguments)
     for name in urdf_links(robot, packages, arguments):
         link = f"{robot}#{name}"
         try:
             source, fit = _fit_link(link, None, packages, progress, arguments, **(room_for(options) | search))
         except MeshError as error:
-            reasons.append(f"{name}: {error}")
-            continue
+            why = "every link is read for what moves beside it; mend it, or take its mesh out of the URDF"
+            raise MeshError(f"{link}: {error}; {why}") from error
         meshes[name] = source.mesh
         if fit.sheets:
             found[name] = LinkDesign(name, (), fit, source.mesh, source.frame, source.notes)
         else:
             reasons.append(f"{name} carries none: {fit.reason}")
-    joints = urdf_joints(robot, packages, arguments)
     beside: dict[str, list[_SweptLink]] = {}
     skins: dict[str, LinkDesign] = {}
     for name, design in found.items():
