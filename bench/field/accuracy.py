@@ -50,11 +50,7 @@ class Single:
         self.told = float(self.sensor.discs(self.discs).error[0])
 
     def __call__(self) -> list[Readings]:
-        if len(self.discs) == 1:
-            disc = self.discs[0]
-            coupling = self.sensor.contacts(disc.u, disc.phi, disc.radius, disc.conductance)
-        else:
-            coupling = self.sensor.discs(self.discs)
+        coupling = self.sensor.discs(self.discs)
         return [self.sensor.read(coupling, phase) for phase in PHASES]
 
 

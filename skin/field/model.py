@@ -96,18 +96,18 @@ class FieldModel:
         Raises:
             FieldError: a disc that cannot be; the tolerance cannot be met (only without `order`).
         """
+        values = np.broadcast(u, phi, radius, conductance)
+        if values.ndim > 2:
+            raise FieldError(f"contacts must have shape (n,) or (n, k), got {values.shape}")
+        if order is None and (values.shape[0] if values.ndim == 2 else values.size) == 1:
+            one = self._scenes.solve([(float(x), float(y), float(r), float(g)) for x, y, r, g in values])
+            if one is not None:
+                return one
         arrays = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (u, phi, radius, conductance)))
-        if arrays[0].ndim not in (0, 1, 2):
-            raise FieldError(f"contacts must have shape (n,) or (n, k), got {arrays[0].shape}")
-        shaped = [a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays]
-        scenes = Discs(*shaped)
+        scenes = Discs(*(a.reshape(-1, 1) if a.ndim < 2 else a for a in arrays))
         check_discs(self.sheet, scenes)
         if order is not None and order < 1:
             raise FieldError(f"order must be at least 1, got {order}")
-        if order is None and shaped[0].shape[0] == 1:
-            scene = list(zip(*(a[0].tolist() for a in shaped), strict=True))
-            if (one := self._scenes.solve(scene)) is not None:
-                return one
         return self._in_groups(scenes, order)
 
     def admittance(self, coupling: Coupling) -> Floats:

@@ -54,13 +54,13 @@ def _rim_powers(order: int) -> tuple[Floats, Floats]:
 
 @cache
 def _log_series(order: int) -> tuple[Complex, Floats]:
-    """Return f_0..f_n of log(1 - exp(-z)) by powers 1..n of 1/(exp(z) - 1), and of log(sinh(t/2) / (t/2)) at 0."""
-    near = np.zeros((order, order + 1), dtype=np.complex128)
-    near[0, 1] = 1.0
+    """Return f_0..f_n of L = log(1 - exp(-z)) by L and powers of 1/(exp(z) - 1), and of log(sinh(t/2) / (t/2)) at 0."""
+    near = np.zeros((order + 1, order + 1), dtype=np.complex128)
+    near[0, 0] = near[1, 1] = 1.0
     k = np.arange(1, order + 1)
     for n in range(2, order + 1):
-        near[:, n] = -k / n * near[:, n - 1]
-        near[1:, n] -= k[:-1] / n * near[:-1, n - 1]
+        near[1:, n] = -k / n * near[1:, n - 1]
+        near[2:, n] -= k[:-1] / n * near[1:-1, n - 1]
     own = np.zeros(order + 1)
     j = np.arange(4000.0, 0.0, -1.0)
     for n in range(2, order + 1, 2):
@@ -73,30 +73,26 @@ class _Tables(NamedTuple):
     """What an order M of one model needs, whatever the contacts are; series are f_0..f_2M, Fourier coefficient 0 last.
 
     Attributes:
-        turns: by the strip's direction (1, -1, i or -i times x + i y): T without b and r, and H of a disc on itself.
-        bends: powers of b in T.
-        powers: powers of r in T.
+        turns: by the strip's direction (1, -1, i or -i times x + i y): T without r^m, and H of a disc on itself.
         index: j + k.
         kernel: what the series at w + w', w + w'*, w - w'* and w - w' are multiplied by in H, shape (4, M+1, M+1).
         linear: H from offset to offset, the same for w' and w'*.
-        near: series by powers of 1/(exp(z) - 1).
+        near: series by the logarithm, and by powers of 1/(exp(z) - 1).
         images: series by exp(n z), n of the `_waves`.
-        slopes: of offset, (-1)^(m-1) / m.
+        slopes: of offset along and, times i, around [sides of the sheet], (-1)^(m-1) / m, shape (2, M).
     """
 
     turns: dict[Any, tuple[Complex, Complex]]  # complex, which mypyc does not find here
-    bends: Floats
-    powers: Floats
     index: Any
-    kernel: Floats
-    linear: Floats
+    kernel: Complex
+    linear: Complex
     near: Complex
     images: Complex
-    slopes: Floats
+    slopes: Complex
 
 
 class _Place(NamedTuple):
-    """A disc in the strip [(shorter side)/pi]: distances from ends and edges, r, b, and the largest |delta|."""
+    """A disc in the strip [(shorter side)/pi]: distances from ends and edges, r, and the largest |delta|."""
 
     x: float
     y: float
@@ -105,7 +101,6 @@ class _Place(NamedTuple):
     p: float
     p_far: float
     radius: float
-    bend: float
     reach: float
 
 
@@ -135,7 +130,7 @@ class SceneSolver:
         self._units = tuple(r / self._total for r in (upper * aspect, math.sqrt(upper * lower), lower / aspect))
         self._digits = math.log(1.0 / (_MIN_TERM * self._tolerance))
         count = math.ceil(self._digits / (_MIN_IMAGE * self._sigma))
-        self._waves = np.arange(1.0, count + 1.0).repeat(2) * np.tile((1.0, -1.0), count)
+        self._waves = np.arange(1.0, count + 1.0).repeat(2) * np.tile((1.0 + 0j, -1.0), count)
         self._tables: dict[int, _Tables] = {}
         self._factorise: Any = None  # with the first table: a guard that solves nothing does not wait for scipy
 
@@ -148,7 +143,7 @@ class SceneSolver:
         j, n = np.arange(order + 1), np.arange(2 * order + 1)
         size = np.abs(self._waves)[:, None]
         factorials = np.array([float(math.factorial(m)) for m in n.tolist()])
-        images = -(self._waves[:, None] ** n) / (
+        images = -(self._waves.real[:, None] ** n) / (
             size * np.expm1(np.minimum(2.0 * self._sigma * size, 600.0)) * factorials
         )
         signed = binomials * (-1.0) ** j
@@ -156,6 +151,8 @@ class SceneSolver:
         linear = np.zeros_like(binomials)
         linear[1, 1] = -0.5 * self._linear
         index, turns = j[:, None] + j, {}
+        # b is everywhere the same multiple of r, so b^(m-j) r^j is a power of it times r^m
+        rim = rim * (self._sheet.curvature / self._scale) ** np.maximum(np.array([*j[1:], 0.0]) - j[:, None], 0.0)
         for turn in (self._turn, -self._turn):
             eta = self._sheet.curvature / (self._scale * turn)
             series = own * (1.0 - eta**n) + images.sum(axis=0)
@@ -164,9 +161,9 @@ class SceneSolver:
             itself[0, 1] += eta / (4.0 * math.pi)
             itself[1, 0] += eta / (4.0 * math.pi)
             turns[turn] = rim * turn ** j[:, None], itself
-        bends = np.maximum(np.array([*range(1, order + 1), 0]) - j[:, None], 0.0)
-        powers, waves = j[:, None].astype(np.float64), images.astype(np.complex128)
-        return _Tables(turns, bends, powers, index, kernel, linear, near, waves, rim[1, :-1])
+        # Complex, what meets complex numbers: numpy takes as long to convert a small array as to multiply it.
+        slopes = rim[1, :-1] / self._scale * np.array([[1.0 / self._sides[0]], [1j / self._sides[1]]])
+        return _Tables(turns, index, *(a.astype(np.complex128) for a in (kernel, linear, near, images, slopes)))
 
     def _place(
         self, u: float, phi: float, radius: float, answer: float, rates: list[tuple[float, float]]
@@ -196,7 +193,7 @@ class SceneSolver:
             rates += _rates(abs(self._odd), answer, min(end, side) / radius)
         at = scale * x, scale * x_far, scale * y, scale * y_far
         s, s_far, p, p_far = at if self._turn == 1.0 else at[2:] + at[:2]
-        return _Place(x, y, s, s_far, p, p_far, r, bend, reach)
+        return _Place(x, y, s, s_far, p, p_far, r, reach)
 
     def _gap(self, one: _Place, other: _Place, here: float, there: float, rates: list[tuple[float, float]]) -> None:
         """Add to the `_rates` what two discs with these answers do to each other; a rate of 0 where they overlap."""
@@ -279,7 +276,7 @@ class SceneSolver:
             inverse.append(1.0 / z)
             logs.append(math.log(size) - distance)
             least, loss = min(least, size), max(loss, reach / math.log1p(size))
-        tolerance, rate = self._tolerance, min(rate for _, rate in rates)
+        tolerance, rate = self._tolerance, min([rate for _, rate in rates])
         if rate < _MIN_RATE or image < _MIN_IMAGE * self._sigma:
             return None
         waves = 2 * math.ceil(self._digits / image)
@@ -314,13 +311,13 @@ class SceneSolver:
         tables = self._tables.get(order)
         if tables is None:
             tables = self._tables[order] = self._of_order(order)
-        turns, bends, powers, index, kernel, linear, near, images, slopes = tables
+        turns, index, kernel, linear, near, images, slopes = tables
         points, inverse, logs, waves = arguments
-        powers_of = np.empty((len(inverse), 2 * order), dtype=np.complex128)
-        powers_of[:] = inverse[:, None]
-        series = np.multiply.accumulate(powers_of, 1, out=powers_of).dot(near)
+        powers_of = np.empty((len(logs), 2 * order + 1), dtype=np.complex128)
+        powers_of[:, 0], powers_of[:, 1:] = logs, inverse[:, None]
+        np.multiply.accumulate(powers_of[:, 1:], 1, out=powers_of[:, 1:])
+        series = powers_of.dot(near)
         series += np.exp(points[:, None] * self._waves[:waves]).dot(images[:waves])
-        series[:, 0] += logs
         k, (length, breadth) = len(places), self._sides
         terms, count = series.take(index, 1), len(pairs)
         same = terms[:count] * kernel[0]
@@ -332,45 +329,44 @@ class SceneSolver:
         step = 2 * k
         first = order * step  # row of the first charge
         size = first + step
-        matrix = np.zeros((size + 2, size + 2))
-        blocks = matrix[:size, :size].reshape(order + 1, k, 2, order + 1, k, 2)
-        rims = [place.bend**bends * place.radius**powers for place in places]
+        # Two neighbours of a row are one complex number, of the real parts' unknown and of the imaginary parts'.
+        grid = np.zeros((size + 2, size // 2 + 1), dtype=np.complex128)
+        blocks = grid[:size, : size // 2].reshape(order + 1, k, 2, order + 1, k)
+        matrix = grid.view(np.float64)
+        reals = matrix[:size, :size].reshape(order + 1, k, 2, order + 1, k, 2)
+        rims, answers = [], []
+        for i, (place, disc) in enumerate(zip(places, discs, strict=True)):
+            ka = math.sqrt(disc[3] * self._total) * disc[2]
+            ratios = _ratios(ka, order + 1)
+            answers.append(1.0 / (2.0 * math.pi * ka * ratios[0]) if ka * ratios[0] > 0.0 else math.inf)
+            rim = []
+            for m in range(order):
+                rim.append(place.radius ** (m + 1) * math.sqrt(2.0 * math.pi * (m + 1) * ratios[m] * ratios[m + 1]))
+            rims.append(np.array([*rim, 1.0], dtype=np.complex128))
+            grid[size:, i : first // 2 : k] = slopes * rims[i][:-1]
         apart = iter(terms[len(terms) - count + k :] * kernel[3] if k > 1 else ())
         for n, (one, other, turn, high_far, low, constant) in enumerate(pairs):
-            rim, itself = turns[turn]
-            here = there = rim * rims[one]
+            to_offset, itself = turns[turn]
+            here = there = to_offset * rims[one]
             if one == other:
                 straight = same[n] + itself
             else:
                 straight = same[n] + next(apart) + linear
-                there = rim * rims[other]
+                there = to_offset * rims[other]
             straight[0, 0] += constant
             straight[1, 0] -= self._linear * low
             straight[0, 1] += self._linear * high_far
             across = here.T
             straight = across.dot(straight).dot(there)
             crossed = across.dot(mirrored[n] if self._odd else linear).dot(there.conj())
-            total, rest = straight + crossed, crossed - straight
-            block = blocks[:, one, :, :, other]
-            block[:, 0, :, 0] = total.real
-            block[:, 1, :, 1] = rest.real
-            block[:, 0, :, 1] = rest.imag
-            np.negative(total.imag, out=block[:, 1, :, 0])
+            turned = straight.conj()
+            blocks[:, one, 0, :, other] = crossed + turned
+            blocks[:, one, 1, :, other] = 1j * (crossed - turned)
             if one != other:
-                blocks[:, other, :, :, one] = block.transpose(2, 3, 0, 1)
+                reals[:, other, :, :, one] = reals[:, one, :, :, other].transpose(2, 3, 0, 1)
         charges = matrix[first:size:2, first:size:2].tolist()
-        scale = [1.0] * size + [1.0 / (self._scale * length), 1.0 / (self._scale * breadth)]
-        for i, disc in enumerate(discs):
-            ka = math.sqrt(disc[3] * self._total) * disc[2]
-            ratios = _ratios(ka, order + 1)
-            charges[i][i] += 1.0 / (2.0 * math.pi * ka * ratios[0]) if ka * ratios[0] > 0.0 else math.inf
-            for m in range(order):
-                root = math.sqrt(2.0 * math.pi * (m + 1) * ratios[m] * ratios[m + 1])
-                scale[step * m + 2 * i] = scale[step * m + 2 * i + 1] = root
-            matrix[size, 2 * i : first : step] = matrix[size + 1, 2 * i + 1 : first : step] = slopes * rims[i][1, :-1]
-        scales = np.array(scale)
-        matrix *= scales[:, None]
-        matrix *= scales
+        for i, answer in enumerate(answers):
+            charges[i][i] += answer
         diagonal = matrix.reshape(-1)[:: size + 3]
         diagonal[:first] += 1.0
         diagonal[first:] = 1e30  # only what is left of it is read
@@ -378,13 +374,12 @@ class SceneSolver:
         if failed:
             return Coupling(*np.full((7, 1), math.nan))
         solved = factor.T[first:, :first]
-        last, before = solved[:, first - step :], solved[:, max(first - 2 * step, 0) : first - step]
-        gram = solved.dot(solved.T)
-        less = gram - last.dot(last.T)
         x, y = [place.x / length for place in places], [place.y / breadth for place in places]
-        found = _totals(gram.tolist(), charges, x, y)
-        one_less = _totals(less.tolist(), charges, x, y)
-        two_less = _totals((less - before.dot(before.T)).tolist(), charges, x, y) if order > 1 else one_less
+        totals = []
+        for end in first, first - step, max(first - 2 * step, 0):  # of this order, and of one and two less
+            part = solved[:, :end]
+            totals.append(_totals(part.dot(part.T).tolist(), charges, x, y))
+        found, one_less, two_less = totals
         change = _solution_change(found, one_less, self._units)
         earlier = _solution_change(one_less, two_less, self._units)
         ratio = min(max(decay, change / earlier if change < earlier else decay), 0.9)
