@@ -475,7 +475,7 @@ def _totals(
         pivot = row[i]
         for below in rows[i + 1 :]:
             factor = below[i] / pivot
-            for j in range(i, k + 3):
+            for j in range(i + 1, k + 3):
                 below[j] -= factor * row[j]
         one, along, around = row[k:]
         g += one * one / pivot
