@@ -27,7 +27,7 @@ from itertools import product
 import numpy as np
 
 from bench.report import head, quantile, show
-from coneskin.commissioning.calibration.calibrate import MARK_COUNTS, calibration_marks
+from coneskin.commissioning.calibration.calibrate import calibration_marks
 from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
 from coneskin.commissioning.misreadings import Place
 from coneskin.core.errors import SkinError
@@ -42,6 +42,7 @@ from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
 
 FOREARM_CONE = Frustum(0.0375, 0.0375, 0.24, math.radians(350.0))
+MARK_COUNTS = (4, 9, 16)
 MARK_ERROR = 0.3e-3  # m, standard deviation along and around each
 MARK_FRAMES = 20  # of each touch of a mark
 PLACE_COUNT = 40  # at which each skin is judged

@@ -92,8 +92,8 @@ def _braking(arm: ArmModel, host: str, wanted: float) -> list[Finding]:
         recipe = connection.ask_outputs(("payload",))
         connection.start()
         (payload,) = recipe.unpack(connection.wait_data(_REPLY_TIMEOUT))
-    inertia, still = loaded(arm_inertia(arm), payload, (0.0, 0.0, 0.0)), (0.0,) * 6
-    directions = [[sign * float(i == joint) for i in range(6)] for joint in range(6) for sign in (1.0, -1.0)]
+    inertia, still, joints = loaded(arm_inertia(arm), payload, (0.0, 0.0, 0.0)), (0.0,) * arm.joints, range(arm.joints)
+    directions = [[sign * float(i == joint) for i in joints] for joint in joints for sign in (1.0, -1.0)]
     held = min(highest_acceleration(arm, inertia, _STRETCHED, still, direction) for direction in directions)
     value = f"stretched out with {payload:g} kg, its motors brake with {held:.1f} rad/s2"
     remedy = (

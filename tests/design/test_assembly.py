@@ -129,6 +129,9 @@ def test_a_cable_goes_around_what_stands_in_its_way() -> None:
     beyond = design.way.points[design.way.points[:, 2] > 0.222][0]
     off = abs(math.remainder(np.arctan2(beyond[1], beyond[0]) - middle, math.tau))
     assert off > 0.2, "beside the wall, not through it"
+    half = 0.5 * design.way.connector_length
+    assert design.way.tie_length == min(design.way.lengths, key=lambda gone: abs(gone - half)), "half-way"
+    assert design.way.connector_length == pytest.approx(options.connector, abs=6e-3)
     assert abs(math.remainder(float(free.way.surface[-1, 1]) - middle, math.tau)) < 0.2
 
 

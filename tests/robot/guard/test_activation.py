@@ -154,3 +154,14 @@ def test_what_is_lost_stays_lost():
     rig.run(0.5)
     rig.reset()
     assert "the controller is gone" in rig.event("refused").details["reasons"]
+
+
+def test_a_release_has_4_s_to_be_acknowledged_and_what_is_waited_for_is_listed_twice_a_second():
+    activation = Activation(settle=0.0)
+    steps = [activation.poll(now, [], []) for now in (0.0, 3.9, 4.1)]
+    assert steps == [ActivationStep.RELEASE, ActivationStep.WAIT, ActivationStep.WITHDRAW]
+    activation, counts = Activation(settle=0.0), []
+    for now in (0.0, 0.45, 0.55):
+        activation.poll(now, ["it is touched"], out := [])
+        counts.append(len(out))
+    assert counts == [0, 0, 1]

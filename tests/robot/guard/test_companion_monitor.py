@@ -90,6 +90,21 @@ def test_time_in_which_the_guard_itself_was_held_up_is_nobodys_silence():
     assert silent(monitor, clock.fair(3.0)) == []
 
 
+def test_a_look_that_saw_it_wait_excuses_a_process_for_90_ms():
+    monitor = companions()
+    monitor.hear_helper(0.0)
+    monitor.hold_up_helper(0.15, "load 9.0 on 2 cores", "driver")
+    assert silent(monitor, 0.235) == []
+    assert "no heartbeat for 150 ms: it hangs" in silent(monitor, 0.245)[0]
+
+
+@pytest.mark.parametrize(("seconds", "taken_off"), [(0.019, 0.0), (0.021, 0.021)])
+def test_more_than_20_ms_between_two_looks_is_a_hold_up_of_the_guard(seconds, taken_off):
+    clock = _StallClock()
+    clock.fair(7.0)
+    assert clock.fair(7.0 + seconds) == pytest.approx(7.0 + seconds - taken_off, abs=1e-9)
+
+
 def test_a_hold_up_of_the_guard_excuses_for_as_long_again_and_no_longer():
     clock = _StallClock()
     assert clock.fair(7.0) == 7.0

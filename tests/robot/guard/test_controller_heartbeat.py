@@ -22,6 +22,12 @@ def test_a_program_that_found_the_count_of_its_start_depends_on_it(at):
     assert started(at).blocker() == ""
 
 
+@pytest.mark.parametrize(("older", "depends"), [(5, True), (6, False)])
+def test_a_report_may_be_five_counts_older_than_the_first_state_of_its_program(older, depends):
+    heartbeat = started(100.01, echo_age=older * COUNT_PERIOD)
+    assert (heartbeat.blocker() == "") is depends
+
+
 @pytest.mark.parametrize("at", [100.0, 2**30 * COUNT_PERIOD + 0.01])
 def test_a_count_from_before_its_start_is_that_of_another_program(at):
     heartbeat = started(at, echo_age=0.5)

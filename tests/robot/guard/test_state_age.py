@@ -57,6 +57,24 @@ def test_a_controller_that_starts_anew():
     assert abs(clock.feed(state_at(2000.010, 0.004)) - 2000.002) < 1e-9
 
 
+@pytest.mark.parametrize(("ahead", "stepped"), [(0.24, False), (0.26, True)])
+def test_a_clock_that_gains_more_than_a_quarter_of_a_second_has_stepped(ahead, stepped):
+    clock = StateAge(0.05)
+    run(clock, [0.0] * 10)
+    clock.feed(state_at(1000.02, 500.02 + ahead))
+    assert clock.newest.stepped == pytest.approx(ahead if stepped else 0.0)
+
+
+def test_states_that_come_late_for_20_ms_move_no_arm_away():
+    clock = StateAge(0.25)
+    run(clock, [0.0] * 10)
+    clock.feed(state_at(1000.09, 500.03))  # 60 ms late, more than 50
+    assert clock.stale(1000.109) == ""
+    assert clock.stale(1000.111) == "the controller's states come more than 50 ms late, too late to move away by"
+    clock.feed(state_at(1000.112, 500.064))  # 48 ms
+    assert clock.stale(1000.2) == ""
+
+
 PATIENT = MonitoringLimits(arm_silence=0.25)  # as a scene of a busy computer has it
 STANDING = (0.0,) * 6, (0.0,) * 6, True, False, True
 RETREAT = Reaction(kind="retreat", distance=0.06)

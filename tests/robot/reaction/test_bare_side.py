@@ -103,3 +103,9 @@ def test_a_sheet_all_around_covers_what_it_lies_on_and_no_more():
     assert len(forearm(sheet(math.tau, low=0.0, length=0.19), sheet(math.tau, low=0.2, length=0.1922))) == 2
     assert forearm(sheet(math.tau, low=0.0, length=0.195), sheet(math.tau, low=0.196, length=0.1962)) == []
     assert len(forearm((2, sheet(math.tau)[1]))) == 2, "of another link"
+
+
+@pytest.mark.parametrize(("gap", "bare"), [(4.9e-3, False), (5.1e-3, True)])
+def test_between_two_sheets_a_part_of_less_than_5_mm_is_felt_by_both(gap, bare):
+    whole = [sheet(math.tau, length=0.2), sheet(math.tau, low=0.2 + gap, length=0.3922 - 0.2 - gap)]
+    assert ("forearm" in BareSides(ARM, whole).parts) is bare

@@ -12,7 +12,7 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.models import ZERO_VELOCITY, arm_model
 from coneskin.robot.arm.workspace import Workspace, skeleton
 from coneskin.robot.guard.signals.joint_current import _push_torque
-from coneskin.robot.reaction.motion_choice import _DAMPING_TIME, _AdmittanceMotion, _PlannedMotion, _wanted_speed
+from coneskin.robot.reaction.motion_choice import _AdmittanceMotion, _PlannedMotion, _wanted_speed
 from coneskin.robot.reaction.retreat import plan_retreat
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, Reaction
 
@@ -102,10 +102,10 @@ def test_half_a_push_is_half_the_speed_and_it_comes_up_as_the_damping_says():
     states, _ = follow(comply(lambda _: 0.35), longest=0.4)  # (0.35 - 0.1) / (0.6 - 0.1)
     speeds = [moved(FOREARM, a.q, b.q) / CYCLE for a, b in pairwise(states)]
     assert speeds[-1] == pytest.approx(0.05, rel=0.01)
-    at = round(_DAMPING_TIME / CYCLE)
+    at = round(0.05 / CYCLE)
     assert speeds[at] == pytest.approx(0.05 * (1 - math.exp(-1)), rel=0.1)  # the arm's ramp is a cycle or two late
     assert max(speeds) < 0.0505
-    assert all(b - a < 0.05 * CYCLE / _DAMPING_TIME * 1.5 for a, b in pairwise(speeds))
+    assert all(b - a < 0.05 * CYCLE / 0.05 * 1.5 for a, b in pairwise(speeds))
 
 
 @pytest.mark.long
@@ -143,8 +143,24 @@ def test_a_push_that_something_else_carries_off_is_followed_no_more():
         for time, push in ((0.1, force), (0.3, left)):
             step = motion.update(ArmState(time, Q, torque=pushed(Q, push)), [FOREARM])
         assert (step.away > 0.0) is moves, (force, left)
-    lighter = replace(FOREARM, level=FOREARM.level - 0.05)
-    assert motion.update(ArmState(0.4, Q, torque=pushed(Q, 4.0)), [lighter]).away > 0.0
+    for time, less, moves in ((0.4, 0.009, False), (0.5, 0.011, True)):
+        lighter = replace(FOREARM, level=FOREARM.level - less)
+        assert (motion.update(ArmState(time, Q, torque=pushed(Q, 4.0)), [lighter]).away > 0.0) is moves
+
+
+@pytest.mark.parametrize(("force", "followed"), [(10.0, 10.0), (60.0, 30.0)])
+def test_a_push_is_followed_at_1500_newton_seconds_a_metre_and_half_of_a_firm_one(force, followed):
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply", speed=0.2))
+    step = motion.update(ArmState(0.9, Q, torque=pushed(Q, force)), [FOREARM])
+    assert step.away == pytest.approx(followed / 1500.0, rel=0.01)
+
+
+@pytest.mark.parametrize(("speed", "moves"), [(0.9e-3, False), (1.1e-3, True)])
+def test_below_a_millimetre_a_second_it_stands(speed, moves):
+    motion = _AdmittanceMotion(ARM, ArmState(0.0, Q), Reaction(kind="comply", speed=0.2, full_level=0.6))
+    touch = replace(FOREARM, level=0.1 + 0.5 * speed / 0.2)
+    step = motion.update(ArmState(0.9, Q, torque=pushed(Q)), [touch])
+    assert any(step.qd) is moves
 
 
 def test_without_motor_currents_it_does_not_give_way():

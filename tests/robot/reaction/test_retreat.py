@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.models import MODEL_NAMES, arm_model
-from coneskin.robot.arm.workspace import _LIMIT_MARGIN
-from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, retreat_step
+from coneskin.robot.arm.workspace import _LIMIT_MARGIN, ArmSweep
+from coneskin.robot.reaction.retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
 from coneskin.robot.reaction.types import ArmState, ContactOnLink, Done, JointVelocity, Reaction
 from tests.support.pinocchio_arm import pin_jacobian
 from tests.support.retreat_simulation import follow, joints_within, touch
@@ -218,3 +219,21 @@ def test_a_retreat_into_a_joint_limit_stays_within_it() -> None:
         assert result.beyond < -0.5 * _LIMIT_MARGIN  # of the margin of 20 mrad the two late cycles take some
         locked += any("limit" in reason for reason in result.clipped)
     assert locked > 3  # else nothing was tried
+
+
+@pytest.mark.parametrize(("left", "goes_on"), [(2.1e-3, True), (1.9e-3, False)])
+def test_it_ends_two_millimetres_before_the_arm_has_moved_as_far_as_it_may(left: float, goes_on: bool) -> None:
+    sweep = ArmSweep.begin(UR10E, Q)
+    reaction = Reaction(kind="retreat", distance=0.2, arm_distance=0.05)
+    plan = plan_retreat(UR10E, ArmState(0.0, Q), [FOREARM], reaction, sweep=sweep)
+    assert isinstance(plan, RetreatPlan)
+    first = retreat_step(plan, ArmState(0.0, Q))
+    assert isinstance(first, JointVelocity)
+
+    def at(time: float) -> Joints:
+        return six([a + time * v for a, v in zip(Q, first.qd, strict=True)])
+
+    time = brentq(lambda time: sweep.distance(at(time)) - (reaction.arm_distance - left), 0.0, 1.0)
+    step = retreat_step(plan, ArmState(0.1, at(time)))
+    assert isinstance(step, JointVelocity) is goes_on
+    assert goes_on or "a point of the arm has moved 50 mm" in step.reason

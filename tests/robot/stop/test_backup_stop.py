@@ -1,5 +1,7 @@
 """Stops without a guard: not given up while the arm moves, quiet while a protective stop works; blind, they end."""
 
+from itertools import pairwise
+
 import pytest
 
 from coneskin.core.channel import Channel, decode_json, pair
@@ -29,6 +31,7 @@ class World:
         self.playing, self.talks, self.told = True, True, 0.0
         self.closed = self.opened = 0
         self.opening = 0.0  # s; that it takes to open what is missing
+        self.reopened, self.timeouts = [], set()
 
     def clock(self):
         self.now += 0.0005
@@ -42,6 +45,7 @@ class World:
 
     def state_reader(self, host, timeout):
         self.now += self.opening
+        self.timeouts.add(timeout)
         return self
 
     # stops
@@ -53,6 +57,7 @@ class World:
         return True
 
     def reopen(self):
+        self.reopened.append(self.now)
         self.now += self.opening
         return False
 
@@ -145,6 +150,7 @@ def test_while_the_arm_moves_it_is_not_given_up_and_a_protective_stop_is_left_to
     assert stop(holding(world), over=lambda: world.now > end) is False
     assert world.now > end
     last = 0.0
+    assert all(0.05 <= later - time < 0.06 for time, later in pairwise(world.reopened[1:])), "what is missing is opened"
     protective = [time for time, path, _ in world.used if path is StopPath.PROTECTIVE]
     assert len(protective) > 10
     for time in protective:  # nothing soon after it: the next program would replace it
@@ -211,7 +217,10 @@ def test_without_states_stops_are_repeated_and_with_them_it_sees_again(world):
     let_pass(world, hold, 8.5)
     assert hold.stands is False
     assert hold.failed is True  # or a watchdog would stay for ever beside a controller that is gone
-    assert 5 <= world.paths(since).count(StopPath.PROGRAM) <= 12  # about one a second
+    times = [time for time, path, _ in world.used if time >= since and path is StopPath.PROGRAM]
+    assert len(times) > 5
+    assert all(1.0 <= later - time < 1.1 for time, later in pairwise(times[1:])), "one a second"
+    assert world.timeouts == {0.5}
     assert StopPath.PROTECTIVE not in world.paths(since)  # nobody has seen it move
     world.talks, world.speed = True, 1.0
     let_pass(world, hold, 3.0)
@@ -318,3 +327,16 @@ def test_the_second_watchdog_stops_the_arm_of_a_guard_that_ends_well_after_its_p
     since = world.now
     assert goes_on(watchdog, world, world.now + 3.0)
     assert StopPath.PROGRAM in world.paths(since)
+
+
+def test_with_neither_program_nor_states_nor_guard_a_watchdog_tries_for_600_ms(world, lonely):
+    world.talks = False
+    watchdog, of_guard, program = lonely(second=True)
+    assert goes_on(watchdog, world, world.now + 0.3, of_guard)
+    program.send(LEAVE)
+    assert goes_on(watchdog, world, world.now + 1.2, of_guard)
+    of_guard.close()
+    gone = world.now
+    assert goes_on(watchdog, world, gone + 0.58)
+    assert not goes_on(watchdog, world, gone + 0.7)
+    assert StopPath.PROGRAM in world.paths(gone)

@@ -40,6 +40,24 @@ def test_an_arm_that_was_still_speeding_up_has_slowed_when_it_is_below_its_top()
     assert stop.course.slowed_at == 0.008
 
 
+def test_what_is_a_slowdown_and_what_is_its_end_has_limits():
+    """A drop by 0.05 rad/s, or a tenth; a rise by 0.1 rad/s above the least; less than 0.01 rad/s slower in 25 ms."""
+    for speed, slows in ((0.951, False), (0.949, True)):
+        stop = monitor()
+        stop.sample(0.002, speed)
+        assert (stop.course.slowed_at is not None) is slows
+    for speed, undone in ((0.599, False), (0.601, True)):
+        stop = monitor()
+        stop.sample(0.002, 0.5)
+        stop.sample(0.004, speed)
+        assert stop.course.undone is undone
+    for slower, undone in ((0.009, True), (0.011, False)):
+        stop = monitor()
+        for now, speed in ((0.002, 0.9), (0.022, 0.9 - slower), (0.03, 0.9 - slower)):
+            stop.sample(now, speed)
+        assert stop.course.undone is undone
+
+
 def test_ways_come_one_by_one_without_slowdown_and_the_last_one_after_the_budget():
     stop = monitor()
     times = {}

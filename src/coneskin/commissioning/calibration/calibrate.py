@@ -28,8 +28,6 @@ from .touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence,
 if TYPE_CHECKING:
     from coneskin.skin.sensor import Sensor
 
-MARK_COUNTS = (4, 9, 16)  #: marks that there may be: 2, 3 or 4 along, and as many around
-
 
 def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
     """Return the marks of a sensor, row by row from end 1, each row from the end of the one before.
@@ -38,7 +36,7 @@ def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
 
     Args:
         sensor: that is calibrated.
-        count: their number, one of MARK_COUNTS.
+        count: their number: 4, 9 or 16, as many along as around.
     """
     cone = sensor.frustum
     places = (Place(along * cone.slant, around * cone.wrap) for along, around in mark_parts(math.isqrt(count)))
@@ -112,7 +110,7 @@ class Calibrator:
 
     Args:
         session: with the skin of the scene, which was read without calibrations.
-        marks: on each sensor, one of MARK_COUNTS; 0: those that its design has printed, else 9.
+        marks: on each sensor: 4, 9 or 16; 0: those that its design has printed, else 9.
         mark_error: standard deviation with which marks are placed and found, at least [m].
         forces: known ones to press with after the marks [N]; none: no table of forces.
         files: sensor file of each sensor, whose design may have printed marks; none where it has none.
