@@ -188,7 +188,11 @@ def test_a_sheet_that_is_not_where_the_scene_says_misses_a_mark(
 def test_without_an_arm_the_words_name_the_electrodes() -> None:
     here = replace(scene(), arm=None)
     (placed,), (item,) = place_on_frusta(here), here.sensors
-    for mark in offer_marks(item.sensor, placed, None):
+    found = offer_marks(item.sensor, placed, None)
+    assert {round(mark.u / item.sensor.frustum.slant, 9) for mark in found} == {0.2, 0.5, 0.8}
+    # each half hour of the clock but a tenth of the wrap beside each edge
+    assert {round(math.degrees(mark.phi)) for mark in found} == set(range(60, 301, 30))
+    for mark in found:
         match = re.fullmatch(
             r"(\d+) mm from electrode B \(end 1\) and (\d+) mm along the arc from electrode D", mark.where
         )
@@ -196,6 +200,29 @@ def test_without_an_arm_the_words_name_the_electrodes() -> None:
         assert int(match[1]) == pytest.approx(1e3 * mark.u, abs=0.6)
         arc = 1e3 * item.sensor.frustum.radius_at(mark.u) * mark.phi
         assert int(match[2]) == pytest.approx(arc, abs=0.6)
+
+
+def test_a_finger_needs_15_mm_beside_an_edge() -> None:
+    """At a radius of 30 mm that is 29 deg, more than a tenth of a wrap of 180 deg."""
+    text = re.sub(r"radius1_mm = [\d.]+", "radius1_mm = 30\nwrap_deg = 180", forearm_scene())
+    text = re.sub(r"radius2_mm = [\d.]+", "radius2_mm = 30", text)
+    here = replace(parse_scene(text), arm=None)
+    (placed,), (item,) = place_on_frusta(here), here.sensors
+    assert {round(math.degrees(mark.phi)) for mark in offer_marks(item.sensor, placed, None)} == {30, 60, 90, 120, 150}
+
+
+@pytest.mark.parametrize(
+    ("link", "tilt", "said"),
+    [
+        ("upper_arm", 0, "mm from the axis of the shoulder, along the upper_arm, "),
+        ("forearm", 59, "mm from the axis of the elbow, along the forearm, "),
+        ("forearm", 61, "mm from electrode B (end 1), about the end of the forearm, "),
+    ],
+)
+def test_a_place_is_told_from_what_there_is_on_its_link(link: str, tilt: int, said: str) -> None:
+    here = scene(link, f"xyz_mm = [0, 0, 80]\nrpy_deg = [0, {tilt}, 0]")
+    (placed,), (item,) = place_on_frusta(here), here.sensors
+    assert all(said in mark.where for mark in offer_marks(item.sensor, placed, START))
 
 
 def test_a_request_tells_programs_the_place_to_a_tenth() -> None:

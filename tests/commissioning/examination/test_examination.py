@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 
 from coneskin.commissioning.examination.examination import Doctor, set_sensor_keys
-from coneskin.commissioning.examination.skin_examination import SensorStatistics, _timing
+from coneskin.commissioning.examination.skin_examination import SensorStatistics, _timing, examine_sensor
 from coneskin.commissioning.examination.wires import touch_places
 from coneskin.core.finding import Finding
 from coneskin.scene.reader import parse_scene
@@ -173,6 +173,37 @@ def test_a_clock_that_a_busy_computer_cannot_judge_is_no_fault_of_the_firmware()
     assert clock(0.08).verdict == "ok"  # a step is no clock
     assert clock(0.0, 2.4).verdict == "warning"
     assert "not told: this computer held frames up, 2" in clock(0.0, 2.4).value
+
+
+def altered(**changes: object) -> dict[str, str]:
+    """Verdicts of a right skin without noise but that of 0.5 counts, whose counts a function changes, by their item."""
+    sensor = parse_scene(TEXT).sensors[0].sensor
+    skin = VirtualSkin(sensor, duration=1.0, rate_hz=200.0, model="ladder")
+    seen = SensorStatistics()
+    for number, (time, frame) in enumerate(skin.frames()):
+        values = {name: round(change(getattr(frame, name), number)) for name, change in changes.items()}  # type: ignore[operator]
+        seen.frames.append(frame._replace(**values))
+        seen.times.append(time)
+    found = examine_sensor(sensor, seen, 0.0, 0.05, 200.0)
+    return {one.item.removeprefix("skin, "): one.verdict for one in found}
+
+
+@pytest.mark.parametrize(
+    ("item", "channel", "change", "verdict"),
+    [
+        ("radial current", "radial_current", lambda count, _: 1.2 * count, "ok"),
+        ("radial current", "radial_current", lambda count, _: 1.3 * count, "warning"),
+        ("angular current", "angular_current", lambda count, _: count / 1.9, "warning"),
+        ("angular current", "angular_current", lambda count, _: count / 2.1, "bad"),
+        ("supply", "touch_supply", lambda count, _: 0.91 * count, "ok"),
+        ("supply", "touch_supply", lambda count, _: 0.89 * count, "bad"),
+        ("noise", "radial_current", lambda count, number: count + 7 * (-1) ** number, "ok"),
+        ("noise", "radial_current", lambda count, number: count + 9 * (-1) ** number, "warning"),
+    ],
+)
+def test_what_is_measured_has_its_limits(item: str, channel: str, change: object, verdict: str) -> None:
+    """Currents within 1.25 times the design's, refused beyond twice; a supply to 10 %; noise of 8 counts."""
+    assert altered(**{channel: change})[item] == verdict
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.2, 0.8])

@@ -39,6 +39,12 @@ def test_another_motion_ends_it_after_a_quarter_of_a_second_and_the_time_to_spee
     assert monitor.exceeded(moving(allowed + 0.001, -0.1), 0.0)
 
 
+def test_no_command_takes_more_than_another_quarter_of_a_second_to_speed_up():
+    monitor = commanded(speed=0.2, acceleration=0.4)
+    assert not monitor.exceeded(moving(0.499, -0.1), 0.0)
+    assert monitor.exceeded(moving(0.501, -0.1), 0.0)
+
+
 def test_a_slower_motion_in_the_same_direction_goes_on():
     monitor = commanded()
     assert not any(monitor.exceeded(moving(0.1 * k, 0.02), 0.0) for k in range(1, 20))

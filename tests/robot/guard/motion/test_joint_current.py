@@ -78,6 +78,10 @@ def test_friction_is_learned_before_and_never_excuses_more_than_the_most():
     arm = Monitored(*usual)
     assert not any(arm.told(ZEROS, *usual[:50]))
     assert any(arm.told(*[one(1, UR_CURRENTS.max_unexplained[1] + 1.0)] * 5))
+    calm = Monitored(ZEROS, one(1, 0.6)).torque  # three times the spread, and learned with 1 s
+    assert calm.tolerance[1] == pytest.approx(UR_CURRENTS.min_unexplained[1] + 3.0 * 0.6)
+    calm.feed(state(ZEROS), False)
+    assert calm.now == pytest.approx(one(1, -0.6 / 500.0))
     wild = Monitored(*[one(1, 100.0 * math.sin(0.3 * k)) for k in range(400)])
     assert wild.torque.tolerance == (3.0, UR_CURRENTS.max_unexplained[1], 3.0, 1.5, 1.5, 1.5)
 

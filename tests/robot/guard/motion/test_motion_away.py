@@ -130,6 +130,7 @@ def test_a_program_that_does_not_start_is_not_waited_for():
     rig.run(1.5)
     assert rig.core.phase is Phase.LATCHED
     assert rig.event("retreated").details["why"] == "its program does not run on the controller"
+    assert rig.event("retreated").time - rig.event("retreating").time == pytest.approx(0.5, abs=0.005)
     assert rig.event("retreated").details["complete"] is False
 
 

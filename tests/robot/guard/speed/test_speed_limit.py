@@ -32,12 +32,14 @@ def test_what_is_read_late_is_not_a_persons_doing() -> None:
     assert (setting.ceiling, setting.fraction, setting.shown) == (1.0, 0.5, True)
 
 
-@pytest.mark.parametrize("read", [0.0, 0.3, 0.55, 0.8, 1.0])
+@pytest.mark.parametrize("read", [0.0, 0.3, 0.489, 0.511, 0.8, 1.0])
 def test_once_the_setting_was_read_anything_else_is_a_persons_doing(read: float) -> None:
     setting = _SliderSetting()
     setting.feed(0.0, 1.0)
     setting.set(0.0, 0.5, 1.0)
     setting.feed(0.02, 0.5)
+    assert not setting.feed(0.03, 0.491)  # the slider is read to a hundredth
+    assert not setting.feed(0.03, 0.509)
     assert setting.feed(0.04, read)
     assert (setting.ceiling, setting.fraction) == (read, None)
 
@@ -169,7 +171,12 @@ def test_what_is_slow_enough_is_let_be() -> None:
 def test_what_does_not_obey_the_slider_is_stopped() -> None:
     loop = Loop(heeds=False).run(3.0, speed=1.0)
     assert "has no effect" in loop.why
-    assert loop.now < 101.2
+    limited = next(event.time for event in loop.events if event.name == EventName.SPEED_LIMITED)
+    assert loop.now - limited == pytest.approx(0.9, abs=0.01), "it was still speeding up: three times its patience"
+    loop = Loop(heeds=False).run(1.0, speed=0.4)
+    loop.limit, since = SpeedLimit(MODEL, replace(ANYWHERE, lowest=(), highest=())), loop.now
+    assert "has no effect" in loop.run(1.0, speed=0.4).why
+    assert loop.now - since == pytest.approx(0.3, abs=0.01), "at a steady speed"
 
 
 def test_without_a_known_slider_too_fast_an_arm_is_stopped_at_once() -> None:
