@@ -95,7 +95,6 @@ class Detector:
         self.timing = FrameTiming(self.settings.timing)
         self.ready = False
         self.reading_now: TouchReading | None = None
-        self._fed = -math.inf
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
         self._zero = UntouchedZero(sensor)
@@ -111,7 +110,7 @@ class Detector:
         self._inversion = FrameInversion(sensor)
         self._places = TouchPlace(sensor, self.settings, self._currents, self._leak, self._guides)
         self._told = ReportedTouch(sensor, self.settings)
-        self._above = self._below = self._quiet = 0
+        self._against = self._quiet = 0  # frames in a row that speak against what is told, or for it while untouched
         self._contradictions = 0.0  # frames taken for a change of contact, less what good frames have taken off
         self._began = 0.0  # the touch, until it is reported as one that lasts
 
@@ -136,7 +135,6 @@ class Detector:
             what happened, mostly nothing.
         """
         events: list[SkinEvent] = []
-        self._fed = now
         restarted = frame.status & _RESTARTED_BIT and self.timing.frames > 0
         if restarted:
             self.timing.restart()
@@ -173,7 +171,7 @@ class Detector:
             return events
         if fault is None and whole < self._release and self._guides.contradict(frame, whole, self.timing.period):
             fault = Fault.GUIDE_DRIVEN
-        if self._diagnosis.active and (fault is None or fault in DIAGNOSED_FAULTS):
+        if self._diagnosis.name is not None and (fault is None or fault in DIAGNOSED_FAULTS):
             name = self._diagnosis.feed(frame, fault)
             if name is not None:
                 self._report(events, name, frame, now, self._diagnosis.words)
@@ -213,8 +211,8 @@ class Detector:
 
     def _begins(self, whole: float) -> bool:
         """Tell whether a frame above the threshold begins a touch, whatever the place is that it has, or has not."""
-        certain = self._above + 1 >= self.settings.confirm_frames and self._contradictions <= _MAX_CONTRADICTIONS
-        return certain and not self.touched and whole >= self._touch and not self._diagnosis.active
+        certain = self._against + 1 >= self.settings.confirm_frames and self._contradictions <= _MAX_CONTRADICTIONS
+        return certain and not self.touched and whole >= self._touch and self._diagnosis.name is None
 
     def _is_change(self, fault: Fault) -> bool:
         """Tell whether a frame's fault may be a contact that came or went between the phases of this one frame.
@@ -235,7 +233,7 @@ class Detector:
     @property
     def untouched_sheets(self) -> tuple[float, float]:
         """Conductances of the upper and the lower sheet, as the untouched frames of late have them [S]."""
-        return self._inversion.untouched(self._currents.radial, self._currents.angular)
+        return self._inversion.untouched(*self._currents.means[1:])
 
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.
@@ -261,15 +259,15 @@ class Detector:
         """
         age = self.timing.age(now)
         events: list[SkinEvent] = []
-        if age > longest and (self._fault is None or now - self._fed > longest):
+        if age > longest and (self._fault is None or self.timing.age(now, valid=False) > longest):
             detail = f"{age * 1e3:.1f} ms" if math.isfinite(age) else "none at all"
             self._report(events, Fault.SILENT, self.timing, now, detail)
         return events
 
     def _while_untouched(self, events: list[SkinEvent], frame: Frame, now: float, level: float) -> None:
         settings = self.settings
-        if self._above:
-            self._above = 0
+        if self._against:
+            self._against = 0
             self._places.end()
         whole = level + self._level.value
         if self._level.exhausted(whole):
@@ -281,14 +279,14 @@ class Detector:
                 self._report(events, Fault.DRIFT, frame, now, f"{whole:+.3f} of the level, for long")
             return
         self._quiet = (self._quiet if self._quiet >= 0 else min(self._quiet + _QUIET_WEIGHT, 0)) + 1
-        if self._diagnosis.active:
+        if self._diagnosis.name is not None:
             self._diagnosis.end()
         self._leak.feed(frame, whole)
         changed = self._currents.feed(frame, self.timing.period)
         if changed is not None:
             self._places.altered |= changed[0] is Fault.CURRENT_CHANGED
             self._report(events, changed[0], frame, now, changed[1])
-        if self._quiet >= settings.settle_frames and self._currents.frames:
+        if self._quiet >= settings.settle_frames and self._currents.means[0]:
             self.ready = True
             self._fault = None
             self._reported.clear()
@@ -304,8 +302,8 @@ class Detector:
         alarm: TouchAlarm | None,
     ) -> None:
         """Take a frame above the threshold. A touch begins once there are enough of them."""
-        self._above += 1
-        certain = self._above >= self.settings.confirm_frames
+        self._against += 1
+        certain = self._against >= self.settings.confirm_frames
         if certain and alarm is not None and not events:
             alarm(self.sensor.name, level)
         self._quiet = 0
@@ -313,7 +311,7 @@ class Detector:
         touch = self._places.begin(frame, reading, level, now)
         if not certain:
             return
-        self._began, self._below = now, 0
+        self._began, self._against = now, 0
         self.reading_now = touch
         events.append(self._told.begin(touch))
 
@@ -323,7 +321,7 @@ class Detector:
             self._end(events, frame, now, level)
             return
         self.reading_now = touch
-        self._below = 0
+        self._against = 0
         if now - self._began >= self.settings.lasting_touch:
             self._report(events, Fault.LAYERS_CLOSED, frame, now, f"{now - self._began:.1f} s")
             self._began = math.inf
@@ -333,11 +331,11 @@ class Detector:
 
     def _end(self, events: list[SkinEvent], frame: Frame, now: float, level: float) -> None:
         """Take a frame of a touch that is below the release threshold."""
-        self._below += 1
-        if self._below < self.settings.release_frames:
+        self._against += 1
+        if self._against < self.settings.release_frames:
             return
         self.reading_now = None
-        self._above = self._quiet = 0
+        self._against = self._quiet = 0
         self._self_test.begin()
         self._places.end()
         events.append(self._told.end(frame, now, level))
@@ -351,7 +349,9 @@ class Detector:
         self, events: list[SkinEvent], fault: Fault, at: Frame | FrameTiming, now: float, detail: str = ""
     ) -> None:
         """Take a fault, and report it where it was not. The diagnosis in words counts as another one."""
-        self._quiet = self._above = 0
+        self._quiet = 0
+        if not self.touched:
+            self._against = 0
         self._currents.restart()
         self.ready = False
         if fault in DIAGNOSED_FAULTS:

@@ -114,8 +114,8 @@ class ReportedTouch:
         self._sensor = sensor
         self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
         self._step, self._far = settings.level_step, settings.move_distance
-        self._told = 0.0, 0.0, 0.0, ""  # level, place and doubt
-        self._placed = self._extended = False
+        # level, place and doubt; a place was certain, a line was found
+        self._told = 0.0, 0.0, 0.0, "", False, False
 
     def begin(self, touch: TouchReading) -> TouchBegan:
         """Return the event with which a touch begins.
@@ -123,9 +123,8 @@ class ReportedTouch:
         Args:
             touch: the frame that confirms it.
         """
-        self._placed = self._extended = False
         time, level, u, phi, valid, doubt, clock, sequence = touch[:8]
-        self._remember(level, u, phi, doubt)
+        self._told = level, u, phi, doubt, not doubt, False
         return TouchBegan(self._sensor.name, time, clock, sequence, level, u, phi, valid, doubt, *touch[8:])
 
     def move(self, touch: TouchReading) -> TouchMoved | None:
@@ -134,21 +133,20 @@ class ReportedTouch:
         Args:
             touch: the frame, above the release threshold.
         """
-        level_told, u_told, phi_told, doubted = self._told
+        level_told, u_told, phi_told, doubted, placed, extended = self._told
         valid, step = touch.location_valid, touch.level - level_told
         shape = None if valid else touch.elongation
         if (
             valid is not (not doubted)
             or not -self._step <= step <= self._step
             or (valid and self._distance(touch.u - u_told, touch.phi - phi_told) > self._far)
-            or (shape is not None and not self._extended)
+            or (shape is not None and not extended)
         ):
             time, level, u, phi, valid, doubt, clock, sequence = touch[:8]
-            self._extended = self._extended or shape is not None
-            certain = (u_told, phi_told) if self._placed and not valid else (u, phi)
+            certain = (u_told, phi_told) if placed and not valid else (u, phi)
             if shape is None:
                 u, phi = certain  # the last place that was certain is the better guess; a line has its own
-            self._remember(level, *certain, doubt)
+            self._told = level, *certain, doubt, placed or not doubt, extended or shape is not None
             return TouchMoved(self._sensor.name, time, clock, sequence, level, u, phi, valid, doubt, *touch[8:])
         return None
 
@@ -160,14 +158,10 @@ class ReportedTouch:
             now: host clock when it arrived [s].
             level: its level, the drift taken off.
         """
-        _, u, phi, _ = self._told
-        return TouchEnded(self._sensor.name, now, frame.clock_us, frame.sequence, level, u, phi, self._placed)
+        _, u, phi, _, placed, _ = self._told
+        return TouchEnded(self._sensor.name, now, frame.clock_us, frame.sequence, level, u, phi, placed)
 
     def _distance(self, u: float, phi: float) -> float:
         """Return the distance of two places that differ by this [m], never too small."""
         around = abs(phi)
         return math.hypot(u, self._radius * (around if around < math.pi else _FULL_TURN - around))
-
-    def _remember(self, level: float, u: float, phi: float, doubt: str) -> None:
-        self._told = level, u, phi, doubt
-        self._placed = self._placed or not doubt

@@ -286,7 +286,7 @@ class FaultDiagnosis:
         currents: of the untouched sensor.
 
     Attributes:
-        active: a fault that may have a cause in the wiring lasts.
+        name: of a fault that may have a cause in the wiring, and lasts. None where none does.
         words: what is broken, for people, where that is known, else empty.
     """
 
@@ -300,9 +300,8 @@ class FaultDiagnosis:
 
     def end(self) -> None:
         """Forget the fault: untouched frames are valid again."""
-        self.active = False
         self.words = ""
-        self._name = Fault.GUIDES_DISAGREE
+        self.name: Fault | None = None
         self._last: Frame | None = None
         self._given: tuple[Frame, Fault] | None = None  # what is explained
         self._fit: _Fit | None = None
@@ -310,9 +309,8 @@ class FaultDiagnosis:
 
     def rename(self, fault: Fault) -> Fault:
         """Return the name of a fault that a frame shows: its own where it is the first, later what was found."""
-        if not self.active:
-            self.active, self._name = True, fault
-        return self._name
+        self.name = self.name or fault
+        return self.name
 
     def feed(self, frame: Frame, fault: Fault | None) -> Fault | None:
         """Take a frame while the fault lasts.
@@ -330,7 +328,7 @@ class FaultDiagnosis:
                 return None
             if self._given is not None and self._differ(self._given[0], frame) < _CHANGE_DIFFERENCE:
                 return None
-            self._given, self._found = (frame, fault or self._name), []
+            self._given, self._found = (frame, fault or self.name or Fault.GUIDES_DISAGREE), []
             self._fit = self._next(frame)
             return None
         for _ in range(_STEPS_PER_FRAME):
@@ -349,12 +347,11 @@ class FaultDiagnosis:
         return most / self._sensor.electronics.full_count
 
     def _next(self, frame: Frame) -> _Fit:
-        currents = self._currents
-        learned = currents.radial > 0.0
+        _, radial, angular = self._currents.means
         upper, lower = 1.0 / self._sensor.radial_ohms, 1.0 / self._sensor.angular_ohms
-        if learned:
-            upper, lower = FrameInversion(self._sensor).untouched(currents.radial, currents.angular)
-        observation = _observe(self._sensor, frame, 1.5, learned)
+        if radial > 0.0:
+            upper, lower = FrameInversion(self._sensor).untouched(radial, angular)
+        observation = _observe(self._sensor, frame, 1.5, radial > 0.0)
         return _Fit(self._hypotheses[len(self._found)], observation, upper, lower)
 
     def _decide(self, given: Fault) -> Fault:
@@ -371,7 +368,7 @@ class FaultDiagnosis:
             fault = both if both and names <= {both, *_WIRE_PAIRS[both]} else given
         if len(near) == 1 and found.fault is fault:
             self.words = found.words
-        self._name = fault
+        self.name = fault
         return fault
 
 

@@ -69,7 +69,7 @@ class FrameSelfTest:
     def deviation(self, matrix: ContactMatrix) -> float:
         """Return how far a frame contradicts itself, over the limit."""
         along, around = matrix.along, matrix.around
-        noise = _LIMIT_DEVIATIONS**2 * self._currents.variance * self._scale  # of a guide, over the supply
+        noise = _LIMIT_DEVIATIONS**2 * self._currents.spread[0] * self._scale  # of a guide, over the supply
         share = 1.0 + around * self._pulldown
         sheets = along * along + around * around
         reciprocity = matrix.reciprocity**2 / ((_RECIPROCITY_LIMIT**2 + 2.0 * noise) * sheets)

@@ -6,6 +6,7 @@ frames, are counted, and reported once each.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -49,8 +50,9 @@ class TouchStream:
             listing = ", ".join(f"{s.name} = {s.device_id}/{s.sensor_id}" for s in sensors)
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
-        self._bad = self._skipped = self._versions = 0
-        self._corrupt = self._starting = self._version_reported = False
+        self._bad = self._skipped = 0
+        self._versions = 0.0  # packets of unknown versions that are no news
+        self._corrupt = self._starting = False
 
     @property
     def ready(self) -> bool:
@@ -91,12 +93,10 @@ class TouchStream:
                 alarm = None
         if self.decoder.bytes_skipped != self._skipped or self._bad:
             self._watch_bytes(events, len(frames), now)
-        if self.decoder.unknown_versions != self._versions:
-            if not self._version_reported:
-                self._version_reported = True
-                detail = f"version {self.decoder.last_unknown_version}"
-                events.append(SkinFault("", now, 0, 0, Fault.UNKNOWN_VERSION, detail))
-            self._versions = self.decoder.unknown_versions
+        if self.decoder.unknown_versions > self._versions:
+            self._versions = math.inf  # it is reported once
+            detail = f"version {self.decoder.last_unknown_version}"
+            events.append(SkinFault("", now, 0, 0, Fault.UNKNOWN_VERSION, detail))
         return events
 
     def silence(self, now: float, longest: float) -> list[SkinEvent]:
@@ -116,7 +116,7 @@ class TouchStream:
 
     def forget_faults(self) -> None:
         """Report faults of the line once more if they go on: a person has reset the guard."""
-        self._corrupt = self._version_reported = False
+        self._corrupt, self._versions = False, float(self.decoder.unknown_versions)
         self.unknown.clear()
 
     def _note_unknown(self, events: list[SkinEvent], frame: Frame, now: float) -> None:

@@ -58,7 +58,6 @@ class FrameTiming:
     Attributes:
         frames: frames taken.
         missing: frames that never came.
-        old: frames that came twice or out of order.
         period: device time from frame to frame, learned [s], 0 before the second frame.
         sequence: of the newest frame.
         clock_us: of the newest frame [us].
@@ -70,33 +69,32 @@ class FrameTiming:
     def __init__(self, limits: TimingLimits) -> None:
         self.limits = limits
         self._drift = limits.clock_drift
-        self.frames = self.missing = self.old = 0
+        self.frames = self.missing = 0
         self.sequence = self.clock_us = 0
         self.detail = ""
         self.held_up = 0.0
-        self._valid_at = -math.inf
+        self._newest = -math.inf, -math.inf  # host clock of the newest frame, and of the newest valid one
         self.restart()
 
     def restart(self) -> None:
         """Forget sequence, clock and period. The counts stay."""
         self.period = self.lag = 0.0
-        self._bucket = 0.0
-        self._device_time = 0.0
-        self._offset = math.inf
-        self._gained = self._started = 0.0
-        self._known = self._old_run = 0
+        self._clocks = 0.0, math.inf, 0.0, 0.0  # device time, its offset, what it has gained, host clock at its start
+        self._rhythm = 0, 0.0  # frames by which the period is known, and missing ones that are remembered
+        self._old_run = 0
 
-    def age(self, now: float) -> float:
-        """Return the time since the newest valid frame [s]. Infinite before the first."""
-        return now - self._valid_at
+    def age(self, now: float, valid: bool = True) -> float:
+        """Return the time since the newest frame, or the newest valid one [s]. Infinite before the first."""
+        fed, seen = self._newest
+        return now - (seen if valid else fed)
 
     def measured_age(self, now: float) -> float:
         """Return for how long the newest valid frame has been history, its way to this computer included [s]."""
-        return now - self._valid_at + self.lag
+        return now - self._newest[1] + self.lag
 
     def seen_valid(self, now: float) -> None:
         """Note that a valid frame came."""
-        self._valid_at = now
+        self._newest = now, now
 
     def feed(self, sequence: int, clock_us: int, now: float) -> Fault | None:
         """Take the numbers of the next frame.
@@ -109,16 +107,16 @@ class FrameTiming:
         Returns:
             what is wrong with them, or None.
         """
-        if self._known == 0:
-            self._known = 1
+        self._newest = now, self._newest[1]
+        if self._rhythm[0] == 0:
+            self._rhythm = 1, 0.0
             self.frames += 1
             self.sequence, self.clock_us = sequence, clock_us
-            self._offset = self._started = now
+            self._clocks = 0.0, now, 0.0, now
             return None
         steps = (sequence - self.sequence + 0x8000 & 0xFFFF) - 0x8000
         elapsed = ((clock_us - self.clock_us + 0x80000000 & 0xFFFFFFFF) - 0x80000000) * 1e-6
         if steps <= 0 or elapsed <= 0.0:
-            self.old += 1
             self._old_run += 1
             if self._old_run >= _RESTART_FRAMES:
                 self.restart()
@@ -127,12 +125,10 @@ class FrameTiming:
         self.frames += 1
         self._old_run = 0
         self.sequence, self.clock_us = sequence, clock_us
-        self._device_time += elapsed
-        settled = now - self._started > _BACKLOG_TIME
-        arrival = self._judge_arrival(now - self._device_time, elapsed * self._drift, settled)
+        arrival = self._judge_arrival(now, elapsed)
         return self._judge_interval(steps, elapsed) or arrival
 
-    def _judge_arrival(self, offset: float, drift: float, settled: bool) -> Fault | None:
+    def _judge_arrival(self, now: float, elapsed: float) -> Fault | None:
         """Judge how late a frame has arrived, and whether the device's clock runs away from the host's.
 
         The offset of the two clocks is known from the quickest frame. It may rise by the drift, and an older quickest
@@ -140,24 +136,27 @@ class FrameTiming:
         lag would hide behind it.
 
         Args:
-            offset: host clock minus device time [s].
-            drift: by which the clocks may have moved apart since the last frame [s].
-            settled: the first frames, which may have been waiting, are read.
+            now: host clock [s].
+            elapsed: device time since the last frame [s].
         """
-        late = self.limits.late
-        self._offset += drift
-        gained = self._gained - 2.0 * drift
-        self._gained = gained if gained > 0.0 else 0.0
-        if offset < self._offset:
-            self._gained += self._offset - offset if settled else 0.0
-            self._offset = offset
-        self.lag = lag = offset - self._offset
+        (device_time, quickest, gained, started), late = self._clocks, self.limits.late
+        drift = elapsed * self._drift  # by which the clocks may have moved apart since the last frame
+        device_time += elapsed
+        offset = now - device_time  # host clock minus device time
+        quickest += drift
+        gained = gained - 2.0 * drift if gained > 2.0 * drift else 0.0
+        if offset < quickest:
+            if now - started > _BACKLOG_TIME:  # the first frames, which may have been waiting, are read
+                gained += quickest - offset
+            quickest = offset
+        self.lag = lag = offset - quickest
+        fast = gained > late and lag <= late + self.held_up
+        self._clocks = device_time, quickest, 0.0 if fast else gained, started
         if lag > late + self.held_up:
             limit = f"{self.lag * 1e3:.1f} ms late, skin_late_ms = {1e3 * late:g}"
             self.detail = f"{limit}; a busy computer needs more, or fewer frames a second; or {self._advice('slow')}"
             return Fault.LATE
-        if self._gained > late:
-            self._gained = 0.0
+        if fast:
             self.detail = f"{late * 1e3:g} ms gained; {self._advice('fast')}"
             return Fault.CLOCK_FAST
         return None
@@ -167,22 +166,20 @@ class FrameTiming:
         return f"the device's clock is {pace} by more than clock_drift_ppm = {ppm:g}; a ceramic resonator needs 5000"
 
     def _judge_interval(self, steps: int, elapsed: float) -> Fault | None:
-        limits = self.limits
-        self._bucket -= limits.missing_share
-        if self._bucket < 0.0:
-            self._bucket = 0.0
-        fault = None
+        limits, (known, bucket), fault = self.limits, self._rhythm, None
+        bucket = bucket - limits.missing_share if bucket > limits.missing_share else 0.0
         if steps > 1:
             self.missing += steps - 1
-            self._bucket += steps - 1
-            if self._bucket > limits.missing:
-                self._bucket = float(limits.missing)
+            bucket += steps - 1
+            if bucket > limits.missing:
+                bucket = float(limits.missing)
                 self.detail = f"{steps - 1} missing at once, {self.missing} in all"
                 fault = Fault.GAP
         each = elapsed / steps
-        if self._known < _LEARNING_FRAMES:
-            self._known += 1
-            self.period += (each - self.period) / (self._known - 1)
+        learning = known < _LEARNING_FRAMES
+        self._rhythm = known + 1 if learning else known, bucket
+        if learning:
+            self.period += (each - self.period) / known
             return fault
         off = abs(elapsed - steps * self.period)
         if off > 0.5 * steps * self.period + limits.clock_slack:

@@ -49,12 +49,11 @@ class UntouchedCurrents:
         drift: fastest change that is followed once they are known, as a ratio of the current [1/s].
 
     Attributes:
-        radial: drive current of the radial phase over the supply [counts over counts].
-        angular: drive current of the angular phase over the supply.
-        frames: frames that the means stand for. It is 0 before the first block: nothing is known.
+        means: the frames that they stand for, 0 before the first block (nothing is known), and the drive currents of
+            the radial and of the angular phase over the supply [counts over counts].
         noise: standard deviation of a reading, rounding included [counts].
-        variance: of (angular - aspect^2 radial) from frame to frame, as the means of blocks show it.
-        bias: largest error of the same quantity that averaging cannot remove: rounding where there is no noise.
+        spread: of (angular - aspect^2 radial), the variance from frame to frame, as the means of blocks show it, and
+            the largest error that averaging cannot remove: rounding where there is no noise.
         aspect: length of the sheet over its breadth, in the rectangle of the field.
     """
 
@@ -64,26 +63,26 @@ class UntouchedCurrents:
         self._drift = drift
         parts = sensor.electronics
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
-        self.variance = (_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE) * (1.0 + self._weight**2) / supply**2
+        variance = (_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE) * (1.0 + self._weight**2) / supply**2
         self.noise = math.sqrt(_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE)
         limits, bounds = sensor.thresholds, sensor.bounds
         current = min(bounds.radial_low, bounds.angular_low) * (1.0 / limits.current_low - 1.0)
         guide = min(_MAX_GUIDE_THRESHOLD, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
         self._per_guide = bounds.touch_current_per_guide
         self._noisiest = min(guide, current) / _THRESHOLD_DEVIATIONS  # counts
-        self.bias = 0.0
-        self.radial = self.angular = self._last = 0.0
-        self.restart()
+        self.spread, self.means = (variance, 0.0), (0, 0.0, 0.0)
+        self._newest = 0.0, 0.0  # mixed means, and zero, of the newest block
+        self.skip()
 
     def restart(self) -> None:
         """Learn the currents anew. The noise stays known."""
-        self._count = self.frames = 0
-        self._sum0 = self._sum1 = self._sum2 = self._zero = 0.0
+        _, radial, angular = self.means
+        self.means = 0, radial, angular
+        self.skip()
 
     def skip(self) -> None:
         """Forget the block that was under way: the sensor is not quiet any more."""
-        self._count = 0
-        self._sum0 = self._sum1 = self._sum2 = 0.0
+        self._block = 0, 0.0, 0.0, 0.0  # frames, and the sums of what they say
 
     def feed(self, frame: Frame, period: float) -> tuple[Fault, str] | None:
         """Take the currents of a quiet frame.
@@ -95,53 +94,57 @@ class UntouchedCurrents:
         Returns:
             a fault, where a current has changed suddenly, or where there is more noise than thresholds bear, and what.
         """
-        self._sum0 += frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide
-        self._sum1 += frame.radial_current / frame.radial_supply
-        self._sum2 += frame.angular_current / frame.angular_supply
-        self._count += 1
-        return None if self._count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
+        count, zero, radial, angular = self._block
+        count += 1
+        zero += frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide
+        radial += frame.radial_current / frame.radial_supply
+        angular += frame.angular_current / frame.angular_supply
+        self._block = count, zero, radial, angular
+        return None if count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
 
     def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
-        zero, mean1, mean2 = self._sum0 / CURRENT_BLOCK, self._sum1 / CURRENT_BLOCK, self._sum2 / CURRENT_BLOCK
+        (_, sum0, sum1, sum2), (frames, radial, angular), (last, known) = self._block, self.means, self._newest
+        zero, mean1, mean2 = sum0 / CURRENT_BLOCK, sum1 / CURRENT_BLOCK, sum2 / CURRENT_BLOCK
         self.skip()
         mixed = mean2 - self._weight * mean1
-        blocks = self.frames // CURRENT_BLOCK
+        blocks = frames // CURRENT_BLOCK
         if not blocks:
-            self.radial, self.angular, self._last, self._zero = mean1, mean2, mixed, zero
-        elif abs(zero - self._zero) > max(_ZERO_CHANGE, _ZERO_DEVIATIONS * self.noise / math.sqrt(CURRENT_BLOCK)):
-            crept = (zero - self._zero) / supply
-            self.radial, self.angular, self._zero = self.radial + crept, self.angular + crept, zero
-            self._last += (1.0 - self._weight) * crept
-        limit = _JUMP_DEVIATIONS * math.sqrt(self.variance / CURRENT_BLOCK)
-        step1, step2 = mean1 - self.radial, mean2 - self.angular
-        upper = abs(step1) > max(_CURRENT_JUMP * self.radial, limit)
-        lower = abs(step2) > max(_CURRENT_JUMP * self.angular, limit)
+            radial, angular, last, known = mean1, mean2, mixed, zero
+        elif abs(zero - known) > max(_ZERO_CHANGE, _ZERO_DEVIATIONS * self.noise / math.sqrt(CURRENT_BLOCK)):
+            crept = (zero - known) / supply
+            radial, angular, known = radial + crept, angular + crept, zero
+            last += (1.0 - self._weight) * crept
+        limit = _JUMP_DEVIATIONS * math.sqrt(self.spread[0] / CURRENT_BLOCK)
+        step1, step2 = mean1 - radial, mean2 - angular
+        upper = abs(step1) > max(_CURRENT_JUMP * radial, limit)
+        lower = abs(step2) > max(_CURRENT_JUMP * angular, limit)
         if upper or lower:
-            part1, part2 = step1 / self.radial, step2 / self.angular
+            self.means, self._newest = (frames, radial, angular), (last, known)
+            part1, part2 = step1 / radial, step2 / angular
             where = "the gain of the current, or both sheets"
             if upper != lower and abs(part1 - part2) > _ALIKE_SHARE * max(abs(part1), abs(part2)):
                 where = f"the {'upper' if upper else 'lower'} sheet, or its bond to {'A or B' if upper else 'C or D'}"
             return Fault.CURRENT_CHANGED, f"{where}: radial {100.0 * part1:+.2f} %, angular {100.0 * part2:+.2f} %"
-        self._learn_noise(mixed - self._last, supply, blocks)
-        self._last = mixed
+        self._learn_noise(mixed - last, supply, blocks)
+        self._newest = mixed, known
         blocks = min(blocks + 1, _CURRENT_MEMORY)
-        self.frames = blocks * CURRENT_BLOCK
         most = self._drift * CURRENT_BLOCK * period if blocks > _FREE_BLOCKS else math.inf
-        self.radial += bounded(step1 / blocks, most * self.radial)
-        self.angular += bounded(step2 / blocks, most * self.angular)
+        radial += bounded(step1 / blocks, most * radial)
+        angular += bounded(step2 / blocks, most * angular)
+        self.means = blocks * CURRENT_BLOCK, radial, angular
         if self.noise > self._noisiest:
             return Fault.NOISE, f"{self.noise:.1f} counts, at most {self._noisiest:.1f}"
         return None
 
     def _learn_noise(self, change: float, supply: int, blocks: int) -> None:
         scale = (1.0 + self._weight * self._weight) / (supply * supply)  # from counts^2
-        seen = 0.5 * CURRENT_BLOCK * change * change if blocks else self.variance
-        self.variance += (seen - self.variance) / (_PRIOR_BLOCKS + blocks)
-        self.variance = max(self.variance, _ROUNDING_VARIANCE * scale)
-        self.noise = math.sqrt(self.variance / scale)
-        noise = max(0.0, self.variance / scale - _ROUNDING_VARIANCE)
+        variance = self.spread[0]
+        seen = 0.5 * CURRENT_BLOCK * change * change if blocks else variance
+        variance = max(variance + (seen - variance) / (_PRIOR_BLOCKS + blocks), _ROUNDING_VARIANCE * scale)
+        self.noise = math.sqrt(variance / scale)
+        noise = max(0.0, variance / scale - _ROUNDING_VARIANCE)
         # The mean of a rounded value whose noise is Gaussian is off by at most this [counts]; here of two means.
-        self.bias = 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
+        self.spread = variance, 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
 
 
 def bounded(step: float, most: float) -> float:
@@ -183,7 +186,7 @@ class UntouchedZero:
         self._rest = min(self._unit, max(1, int(0.25 * bounds.touch_current_slack)))  # well within what is no leak
         self._per_guide = bounds.touch_current_per_guide
         self._seen: list[float] = []
-        self._waited = self._since = 0.0
+        self._waited = 0.0, 0.0  # since the zero was moved, and since the newest frame that was looked at [s]
         self.known = self.hidden = False
         self.excess = ""
 
@@ -195,12 +198,14 @@ class UntouchedZero:
             period: time from frame to frame [s].
             free: nobody relies on the sensor yet: another zero may be taken at once.
         """
-        self._waited += period
-        self._since += period
+        waited, since = self._waited
+        waited += period
+        since += period
         seen = self._seen
-        if self.known and self._since < (0.5 + _ZERO_TURN * len(seen) % 1.0) * _ZERO_TIME / CURRENT_BLOCK:
+        looked = not self.known or since >= (0.5 + _ZERO_TURN * len(seen) % 1.0) * _ZERO_TIME / CURRENT_BLOCK
+        self._waited = waited, 0.0 if looked else since
+        if not looked:
             return False
-        self._since = 0.0
         seen.append(frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide)
         if len(seen) < CURRENT_BLOCK:
             return False
@@ -220,8 +225,8 @@ class UntouchedZero:
         if free:
             self.counts = median
             return True
-        if self._waited >= _ZERO_STEP:
-            self._waited = 0.0
+        if waited >= _ZERO_STEP:
+            self._waited = 0.0, 0.0
             self.counts += max(-self._unit, min(self._unit, change))
         return False
 
@@ -259,16 +264,12 @@ class UntouchedGuides:
 
     Args:
         currents: of the untouched sensor, with the noise that was learned.
-
-    Attributes:
-        radial_hum: variance of the two guides' mean in the radial phase, over the supply squared.
-        angular_hum: likewise in the angular phase.
     """
 
     def __init__(self, currents: UntouchedCurrents) -> None:
         self._currents = currents
-        self._radial = self._angular = self.radial_hum = self.angular_hum = 0.0
-        self._level = math.inf  # until it is known
+        self._rest = 0.0, 0.0, math.inf  # potentials in the radial and the angular phase, and the level: not yet known
+        self._hum = 0.0, 0.0  # variances of the two guides' mean in these phases, over the supply squared
 
     def hum(self, supply: float) -> tuple[float, float]:
         """Return the variances of X and Y by what swings on the guides and not on the currents; 0 where none does.
@@ -276,11 +277,8 @@ class UntouchedGuides:
         Args:
             supply: of a phase [counts].
         """
-        least = 0.5 * _HUM_RATIO * (self._currents.noise / supply) ** 2
-        return (
-            self.radial_hum if self.radial_hum > least else 0.0,
-            self.angular_hum if self.angular_hum > least else 0.0,
-        )
+        least, (radial, angular) = 0.5 * _HUM_RATIO * (self._currents.noise / supply) ** 2, self._hum
+        return radial if radial > least else 0.0, angular if angular > least else 0.0
 
     def contradict(self, frame: Frame, level: float, period: float) -> bool:
         """Tell whether the guides show a contact that the level does not.
@@ -293,9 +291,10 @@ class UntouchedGuides:
         supply = frame.touch_supply
         radial = 0.5 * (frame.radial_c + frame.radial_d) / frame.radial_supply
         angular = 0.5 * (frame.angular_a + frame.angular_b) / frame.angular_supply
-        if self._level == math.inf:
-            self._radial, self._angular, self._level = radial, angular, level
-        step1, step2 = radial - self._radial, angular - self._angular
+        rest1, rest2, rest = self._rest
+        if rest == math.inf:
+            self._rest = rest1, rest2, rest = radial, angular, level
+        step1, step2 = radial - rest1, angular - rest2
         split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
         differ = _GUIDE_JUMP * supply
         if (
@@ -303,15 +302,15 @@ class UntouchedGuides:
             or step2 > _GUIDE_JUMP
             or not (-differ <= split1 <= differ and -differ <= split2 <= differ)
         ):
-            return (level - self._level) * supply < _LEVEL_COUNTS and self._exceed_noise(
+            return (level - rest) * supply < _LEVEL_COUNTS and self._exceed_noise(
                 step1, step2, split1 / supply, split2 / supply, supply
             )
-        self.radial_hum += _HUM_WEIGHT * step1 * step1 - _HUM_MEMORY * self.radial_hum
-        self.angular_hum += _HUM_WEIGHT * step2 * step2 - _HUM_MEMORY * self.angular_hum
-        most = _MAX_GUIDE_GROWTH * period
-        self._radial += bounded(step1, most)
-        self._angular += bounded(step2, most)
-        self._level += bounded(0.1 * (level - self._level), most)  # a step of the noise is not followed
+        (hum1, hum2), most = self._hum, _MAX_GUIDE_GROWTH * period
+        hum1 += _HUM_WEIGHT * step1 * step1 - _HUM_MEMORY * hum1
+        hum2 += _HUM_WEIGHT * step2 * step2 - _HUM_MEMORY * hum2
+        self._hum = hum1, hum2
+        rest += bounded(0.1 * (level - rest), most)  # a step of the noise is not followed
+        self._rest = rest1 + bounded(step1, most), rest2 + bounded(step2, most), rest
         return False
 
     def _exceed_noise(self, step1: float, step2: float, split1: float, split2: float, supply: int) -> bool:

@@ -78,11 +78,11 @@ class SingleContactTest:
 
     def begin(self) -> None:
         """Forget the evidence: another touch, or another place."""
-        self._frames = 0
-        self._differ = self._across = self._mean = self._required = self._disc = 0.0
+        self._evidence = 0, 0.0, 0.0, 0.0, 0.0, 0.0  # frames; means of the inequality, across, rise, required, disc
         self._certain = False
-        if self._currents.frames:
-            self._sheets = self._inversion.untouched(self._currents.radial, self._currents.angular)
+        frames, radial, angular = self._currents.means
+        if frames:
+            self._sheets = self._inversion.untouched(radial, angular)
 
     def largest_disc(self, u: float) -> float:
         """Return the radius up to which one contact at u [m] is taken for one [m]."""
@@ -100,28 +100,28 @@ class SingleContactTest:
         Returns:
             why there may be more than one contact. Empty once that is excluded.
         """
-        currents = self._currents
-        learned = currents.frames
+        learned, (variance, bias) = self._currents.means[0], self._currents.spread
         if not learned:
             return _CURRENTS_UNKNOWN
-        frames = self._frames
+        frames, differ, across, mean, required, widest = self._evidence
         if frames < _PAIR_FRAMES:
-            self._frames = frames = frames + 1
+            frames += 1
         gain, limit = 1.0 / frames, self._limit
         (along, cross, around), (upper, lower) = matrix[3:6], self._sheets
         rise1, rise2 = self._per_along * (along - upper), self._angles * (around - lower)
         total = level / (1.0 - level) * self._pulldown if level < 0.999 else limit
-        self._differ = differ = self._differ + gain * (rise2 - rise1 - self._differ)
-        self._across = across = self._across + gain * (self._per_cross * cross - self._across)
-        self._mean += gain * (0.5 * (rise1 + rise2) - self._mean)
+        differ += gain * (rise2 - rise1 - differ)
+        across += gain * (self._per_cross * cross - across)
+        mean += gain * (0.5 * (rise1 + rise2) - mean)
         if disc is not None:
             distance = DANGEROUS_ANGLE * (self._radius1 + self._taper * u)
             largest = _DISC_TOLERANCE * disc / (distance * distance)
-            self._disc = self._disc + gain * (largest - self._disc) if self._disc else largest
-        self._required = required = self._required + gain * ((total if total < limit else limit) - self._required)
+            widest = widest + gain * (largest - widest) if widest else largest
+        required += gain * ((total if total < limit else limit) - required)
+        self._evidence = frames, differ, across, mean, required, widest
         # what is seen, compared with what the weakest dangerous pair would show
-        noise = self._scale * math.sqrt(currents.variance * (gain + 1.0 / learned))
-        slack = _PAIR_DEVIATIONS * noise + self._unit * currents.bias
+        noise = self._scale * math.sqrt(variance * (gain + 1.0 / learned))
+        slack = _PAIR_DEVIATIONS * noise + self._unit * bias
         seen = math.sqrt(differ * differ + across * across)
         # What was excluded once is not doubted again for noise: one standard deviation is left of three.
         limit, held = (required, slack / _PAIR_DEVIATIONS) if self._certain else (_CERTAIN_SHARE * required, slack)
@@ -131,10 +131,8 @@ class SingleContactTest:
                 return _SEVERAL_CONTACTS
             return _TOO_FEW_FRAMES if frames < _PAIR_FRAMES else _COARSE_READINGS
         # the mean of two rises has half the noise of their difference
-        if disc is not None and self._mean + 0.5 * held > self._disc:
-            return (
-                _LARGE_CONTACT if self._mean - 0.5 * slack > self._disc or frames >= _PAIR_FRAMES else _TOO_FEW_FRAMES
-            )
+        if disc is not None and mean + 0.5 * held > widest:
+            return _LARGE_CONTACT if mean - 0.5 * slack > widest or frames >= _PAIR_FRAMES else _TOO_FEW_FRAMES
         self._certain = True
         return ""
 
@@ -150,14 +148,16 @@ class SingleContactTest:
         Returns:
             half the length [m], and the angle from u towards growing phi [rad], within a right angle.
         """
-        if not self._frames or not self._currents.frames or not conductance > 0.0:
+        (frames, differ, across, mean, _, _), learned = self._evidence, self._currents.means[0]
+        if not frames or not learned or not conductance > 0.0:
             return None
-        noise = self._scale * math.sqrt(self._currents.variance * (1.0 / self._frames + 1.0 / self._currents.frames))
-        seen = math.hypot(self._differ, self._across)
-        if seen < _LINE_DEVIATIONS * noise + self._unit * self._currents.bias + _ROUND_UNEQUAL * max(0.0, self._mean):
+        variance, bias = self._currents.spread
+        noise = self._scale * math.sqrt(variance * (1.0 / frames + 1.0 / learned))
+        seen = math.hypot(differ, across)
+        if seen < _LINE_DEVIATIONS * noise + self._unit * bias + _ROUND_UNEQUAL * max(0.0, mean):
             return None
         around = math.sqrt(seen / self._angles / conductance) * self._wrap  # [rad], of the circle about the axis
-        return around * self._radius1, 0.5 * math.atan2(self._across, -self._differ)
+        return around * self._radius1, 0.5 * math.atan2(across, -differ)
 
 
 def _split_noise(sensor: Sensor, aspect: float) -> float:
@@ -183,7 +183,7 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100) -> float:
     currents = UntouchedCurrents(sensor, 0.0)
     parts = sensor.electronics
     unit = parts.current_full_scale / parts.adc_volts * (sensor.frustum.wrap / DANGEROUS_ANGLE) ** 2
-    noise = math.sqrt(currents.variance / min(frames, _PAIR_FRAMES))
+    noise = math.sqrt(currents.spread[0] / min(frames, _PAIR_FRAMES))
     return unit * _PAIR_DEVIATIONS * max(1.0, _split_noise(sensor, currents.aspect)) * noise / _CERTAIN_SHARE
 
 

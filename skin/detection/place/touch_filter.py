@@ -36,9 +36,6 @@ class TouchFilter:
     Attributes:
         frames: that the averages stand for, 1 where it has just begun anew, 0 before the first.
         values: the first six of a ``ContactMatrix``: the centre where it is now, the others averaged.
-        share: variance of the centre over that of one frame, by noise.
-        motion: covariances xx, xy, yy of the centre by motion, as ratios of the sides squared.
-        velocity: of the centre [sides per frame]; 0 where it may rest.
     """
 
     def __init__(self, length: tuple[float, float]) -> None:
@@ -53,10 +50,26 @@ class TouchFilter:
     def begin(self, matrix: ContactMatrix) -> None:
         """Begin with a matrix."""
         self.frames, self.values = 1, matrix[:6]
-        self._first, self._smooth, self._step = matrix[1:3], (0.0, 0.0), (0.0, 0.0)
+        self._centre = matrix.x, matrix.y, 0.0, 0.0  # the first, and how far predictions were off of late
         self._sums = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # of ages^0, ^1, ^2; of x and y, alone and by age
-        self.share = self._ahead = 1.0
-        self.motion = self.velocity = (0.0, 0.0, 0.0)
+        self._line = 1.0, 1.0, 0.0, 0.0, 0.0, 0.0  # variances now and one frame ahead, steps, chance, what is unsure
+
+    @property
+    def share(self) -> float:
+        """Variance of the centre over that of one frame, by noise."""
+        return self._line[0]
+
+    @property
+    def motion(self) -> tuple[float, float, float]:
+        """Covariances xx, xy, yy of the centre by motion, as ratios of the sides squared."""
+        _, _, step_x, step_y, _, unsure = self._line
+        return unsure * step_x * step_x, unsure * step_x * step_y, unsure * step_y * step_y
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """Of the centre [sides per frame]; 0 where it may rest."""
+        _, _, step_x, step_y, moves, _ = self._line
+        return (step_x, step_y) if moves > _TOLD_CHANCE else (0.0, 0.0)
 
     def feed(self, matrix: ContactMatrix, noise: MatrixNoise, period: float) -> None:
         """Take the matrix of the next frame.
@@ -74,15 +87,15 @@ class TouchFilter:
         usual = _USUAL_SPEED * period
         usual_x, usual_y = (usual / self._length[0]) ** 2, (usual / self._length[1]) ** 2
         xx, yy = noise.xx, noise.yy
-        moving_x, moving_y = self.motion[0], self.motion[2]
+        (_, ahead, step_x, step_y, moves, unsure), (first_x, first_y, smooth_x, smooth_y) = self._line, self._centre
+        moving_x, moving_y = unsure * step_x * step_x, unsure * step_y * step_y
         if self.frames == 1:
             moving_x, moving_y = usual_x, usual_y
-        (step_x, step_y), (smooth_x, smooth_y), (first_x, first_y) = self._step, self._smooth, self._first
-        off_x, off_y = new_x - x - step_x, new_y - y - step_y
+        off_x, off_y = new_x - x - moves * step_x, new_y - y - moves * step_y
         smooth_x += _SMOOTHING_GAIN * (off_x - smooth_x)
         smooth_y += _SMOOTHING_GAIN * (off_y - smooth_y)
-        self._smooth = smooth_x, smooth_y
-        alone, smooth = 1.0 + self._ahead, _SMOOTHED_VARIANCE + self._ahead
+        self._centre = first_x, first_y, smooth_x, smooth_y
+        alone, smooth = 1.0 + ahead, _SMOOTHED_VARIANCE + ahead
         if (
             off_x * off_x > _JUMPED_VARIANCE * (alone * xx + moving_x)
             or off_y * off_y > _JUMPED_VARIANCE * (alone * yy + moving_y)
@@ -114,13 +127,13 @@ class TouchFilter:
         self._sums = s0, s1, s2, kept * x0 + x, kept * (x1 - x0), kept * y0 + y, kept * (y1 - y0)
 
     def _fit(self, xx: float, yy: float, usual_x: float, usual_y: float) -> tuple[float, float]:
-        """Return the centre now, and note its covariance and velocity.
+        """Return the centre now, and note the line that it is on.
 
         Args:
             xx, yy: noise of one frame's centre.
             usual_x, usual_y: variances of the velocity of what moves [sides per frame].
         """
-        (s0, s1, s2, x0, x1, y0, y1), (first_x, first_y) = self._sums, self._first
+        (s0, s1, s2, x0, x1, y0, y1), (first_x, first_y, _, _) = self._sums, self._centre
         share = 1.0 / s0
         lag = -s1 * share  # frames from the mean time of them all
         spread = s2 + s1 * lag
@@ -137,11 +150,8 @@ class TouchFilter:
             chance = math.exp(-0.5 * seen)
             moves = 1.0 / (1.0 + math.sqrt(odds) * chance)
             slides = 1.0 / (1.0 + math.sqrt(slow_odds) * chance)
-        self._step = moves * step_x, moves * step_y
-        self.share = share + moves * lag * lag * by_noise
-        self._ahead = share + moves * (lag + 1.0) * (lag + 1.0) * by_noise
         # behind a slide by 1 - moves of its way, ahead of what rests by moves
         unsure = (moves * moves + slides * (1.0 - 2.0 * moves)) * lag * lag + moves * _PHASE_SKEW * _PHASE_SKEW
-        self.motion = unsure * step_x * step_x, unsure * step_x * step_y, unsure * step_y * step_y
-        self.velocity = (step_x, step_y, 0.0) if moves > _TOLD_CHANCE else (0.0, 0.0, 0.0)
+        ahead = share + moves * (lag + 1.0) * (lag + 1.0) * by_noise
+        self._line = share + moves * lag * lag * by_noise, ahead, step_x, step_y, moves, unsure
         return first_x + mean_x + moves * lag * step_x, first_y + mean_y + moves * lag * step_y

@@ -77,6 +77,8 @@ class TouchPlace:
         self._filter = TouchFilter(self._scale)
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
+        # frames for which the estimate serves, in all when it is made anew, conductance of which it was made [S]
+        self._due: tuple[int, float, float] = 0, 1.0, 0.0
         self.altered = False
         self._located = False
         self._began = 0.0
@@ -135,12 +137,11 @@ class TouchPlace:
             self._noise = noise = self._noise_of(matrix, frame, period)
         track.feed(matrix, noise, period)
         frames, (whole, x, y) = track.frames, track.values[:3]
-        if frames == 1:
-            self._next = 1.0
-        estimate = self._estimate
-        steady = abs(whole - self._solved) < _SOLVE_STEP * self._solved
-        self._rest -= 1
-        if estimate is None or (self._rest <= 0 and (frames >= self._next or not steady)):
+        estimate, (rest, due, solved) = self._estimate, self._due
+        rest, due = rest - 1, 1.0 if frames == 1 else due
+        self._due = rest, due, solved
+        steady = abs(whole - solved) < _SOLVE_STEP * solved
+        if estimate is None or (rest <= 0 and (frames >= due or not steady)):
             estimate, steady = self._solve(frame, now, period), True
         u, phi = self._placed(x, y, estimate)
         doubt = self._doubt(reading, matrix, level, u, estimate)
@@ -148,7 +149,7 @@ class TouchPlace:
             estimate, steady = self._solve(frame, now, period), True
             u, phi = self._placed(x, y, estimate)
         covariance = estimate.covariance(track.share, track.motion)
-        step_x, step_y, _ = track.velocity
+        step_x, step_y = track.velocity
         rate = 1.0 / period if period > 0.0 else 0.0
         velocity = step_x * estimate.scale[0] * rate, step_y * estimate.scale[1] * rate
         if doubt and self._seam.closes and (seam := self._over_seam(reading, matrix, now)) is not None:
@@ -180,9 +181,7 @@ class TouchPlace:
 
     def _restart(self) -> None:
         self._filter.restart()
-        self._rest = 0
-        self._next = 1.0
-        self._solved = 0.0  # conductance of which the estimate was made [S]
+        self._due = 0, 1.0, 0.0
         self._noise = None
         self._estimate: PlaceEstimate | None = None
 
@@ -194,12 +193,12 @@ class TouchPlace:
         estimate = self._estimator.estimate(mean, noise, float(frames), self._sheets(now))
         if self._map is not None:
             estimate = self._mapped(estimate)
-        self._solved, self._estimate, self._rest = mean.conductance, estimate, _REFRESH_FRAMES
-        self._next = frames * _REFRESH_RATIO if frames < _FLOOR_FRAMES else math.inf
+        due = frames * _REFRESH_RATIO if frames < _FLOOR_FRAMES else math.inf
+        self._estimate, self._due = estimate, (_REFRESH_FRAMES, due, mean.conductance)
         return estimate
 
     def _noise_of(self, matrix: ContactMatrix, frame: Frame, period: float) -> MatrixNoise:
-        noise = self._of_frame.of(matrix, frame, self._currents.variance * self._count_variance)
+        noise = self._of_frame.of(matrix, frame, self._currents.spread[0] * self._count_variance)
         hum_x, hum_y = self._guides.hum(frame.radial_supply)
         if not (hum_x or hum_y):
             return noise
@@ -208,13 +207,13 @@ class TouchPlace:
 
     def _sheets(self, now: float) -> SheetConductances:
         """Return the sheets as they were learned. While a touch lasts they may drift unseen."""
-        currents = self._currents
-        if not currents.frames:
+        (frames, radial, angular), (variance, bias) = self._currents.means, self._currents.spread
+        if not frames:
             upper, lower = self._estimator.sheets
             return SheetConductances(upper, lower, (_UNLEARNED_ERROR * upper) ** 2, (_UNLEARNED_ERROR * lower) ** 2)
-        upper, lower = self._inversion.untouched(currents.radial, currents.angular)
-        one = currents.variance / (1.0 + currents.aspect**4) / currents.frames + currents.bias**2
-        ratio = one / currents.radial**2, one / currents.angular**2
+        upper, lower = self._inversion.untouched(radial, angular)
+        one = variance / (1.0 + self._currents.aspect**4) / frames + bias**2
+        ratio = one / radial**2, one / angular**2
         drift = (self._drift * (now - self._began)) ** 2 + self._sheet_drift
         return SheetConductances(upper, lower, upper * upper * (ratio[0] + drift), lower * lower * (ratio[1] + drift))
 

@@ -135,7 +135,7 @@ def test_learned_currents_go_with_a_zero_that_creeps(rate):
     assert detector.ready
     counts = expected_counts(slender)
     left = 51.0 + rate * 23.0 - detector._zero.counts  # of the zero, in the currents of every frame
-    for learned, at in ((detector._currents.radial, 5), (detector._currents.angular, 8)):
+    for learned, at in ((detector._currents.means[1], 5), (detector._currents.means[2], 8)):
         assert learned * counts[9] == pytest.approx(counts[at] - 51.0 + left, abs=1.0)
 
 
