@@ -98,6 +98,33 @@ def test_what_the_page_says_for_the_scene_is_a_scene(sensor_file, board):
     assert scene.sensors[0].sensor.electronics.adc_bits == boards()[board].bits + 1
 
 
+@pytest.mark.parametrize("supply", [2.5, 2.048])
+def test_what_a_scene_is_told_is_what_the_parts_make(supply):
+    """From the values on the list alone: a pin of 30 ohm and a wire of 1 ohm are the only ones that are not on it."""
+    sensor = Sensor(Frustum(0.0375, 0.0375, 0.24, 6.1), electronics=replace(Electronics(), supply_volts=supply))
+    circuit, units = board_circuit("pico", sensor), {"ohm": 1.0, "kohm": 1e3, "Mohm": 1e6}
+
+    def between(one, other):
+        (value,) = (c.value for c in circuit.components if [*c.pins.values()] == [one, other] and c.name[0] == "R")
+        figure, unit = value.split()
+        return float(figure) * units[unit]
+
+    shunt, down, beside = between("REG", "RAIL"), between("DRIVE_C", "DOWN_C"), between("S_C", "GND")
+    low, high = between("BIAS", "GND"), between("3V3", "BIAS")
+    on = part_catalog()["switch"]["limits"]["on_ohm"][0]
+    assert circuit.keys == {
+        "adc_v": 3.3,
+        "adc_bits": boards()["pico"].bits + 1,
+        "lead_ohm": [pytest.approx(1.0 + on)] * 4,
+        "supply_v": 2.5 if supply == 2.5 else pytest.approx(1e-4 * between("SET", "GND")),
+        "pulldown_ohm": pytest.approx(1.0 / (1.0 / (down + 31.0) + 1.0 / beside) + 1.0 + on, abs=0.06),
+        "input_ohm": pytest.approx(beside),
+        "current_full_scale_ma": pytest.approx(1e3 * 3.3 / (50.0 * shunt), rel=2e-3),  # the list has three digits
+        "current_zero_ma": pytest.approx(1e3 * 3.3 * low / (low + high) / (50.0 * shunt), rel=2e-3),
+    }
+    assert beside == max(470e3, 10.0 * down)
+
+
 @pytest.mark.parametrize("converter", list(converters()))
 def test_another_converter_is_in_sketch_wiring_page_and_scene(sensor_file, converter):
     code, folder = write(sensor_file, "--converter", converter)

@@ -17,6 +17,54 @@ from coneskin.geometry.fit.fit_options import FitOptions
 KEYS = {f"{table}.{key.name}": key for table, (_, keys) in DESIGN_TABLES.items() for key in keys}
 
 
+#: limits and default of each number, as a person sees them
+NUMBERS = """
+search.tolerance_mm: above 0 to 20, 1
+search.max_sheets: 1 to 100, 2
+search.max_wires: 4 to 400, any number
+search.min_length_mm: above 0, 25
+search.min_wrap_deg: above 0 to 360, 150
+search.max_bridge_mm: above 0 to 100, 10
+layers.thickness_mm: above 0 to 20, [2.5, 0.1, 0.8, 0.1, 2.5]
+layers.neutral_factor: 0 to 1, [0.5, 0.5, 0.5, 0.5, 0.5]
+layers.stiffness_mpa: above 0, [0.3, 1000, 20, 1000, 0.3]
+electrodes.margin_mm: at least 0, 6
+electrodes.electrode_mm: at least 0, 6
+electrodes.setback_mm: at least 0, 1
+electrodes.lead_mm: at least 0, 4
+electrodes.clearance_mm: at least 0, 1.5
+electrodes.tab_mm: at least 0, 12
+electrodes.hole_mm: at least 0, 2.5
+sheet.connector_mm: 30 to 2000, 60
+sheet.seam_gap_mm: at least 0, 0
+sheet.overlap_mm: at least 0, 0
+sheet.sheet_gap_mm: at least 0, 1
+drawings.kerf_mm: at least 0, 0
+drawings.tolerance_mm: 0.0001 to 1, 0.01
+drawings.bed_mm: 50 to 10000, [600, 400]
+drawings.bed_gap_mm: 0 to 100, 3
+jig.wall_mm: 1.5 to 20, 3
+jig.clearance_mm: 0 to 3, 0.3
+jig.reach_mm: 8 to 200, 20
+jig.grip_mm: 4 to 100, 15
+jig.parts: 2 to 8, 2
+electronics.supply_v: 0.1 to 50, matches the sheets
+electronics.adc_v: 0.1 to 50, 3.3
+electronics.adc_bits: 8 to 16, matches the sheets
+electronics.pulldown_ohm: 1 to 1e+09, matches the sheets
+electronics.current_full_scale_ma: 0.001 to 10000, matches the sheets
+electronics.upper_sheet_ohm: 0.001 to 1e+09, chosen to match the sheet
+electronics.lower_sheet_ohm: 0.001 to 1e+09, chosen to match the sheet
+"""
+
+
+def test_each_number_has_its_limits_and_its_default() -> None:
+    found = [
+        f"{name}: {key.bounds}, {key.default_words}" for name, key in KEYS.items() if key.kind in (float, int, list)
+    ]
+    assert [line for line in found if not re.search(r": , ", line)] == NUMBERS.strip().splitlines()
+
+
 def written(folder: Path, text: str) -> Path:
     path = folder / "design.toml"
     path.write_text(text, encoding="utf-8")

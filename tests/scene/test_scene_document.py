@@ -1,5 +1,6 @@
 """Examples of docs/look-up/scene.md load. Its tables are made by scripts/reference.py."""
 
+import importlib.util
 import re
 
 import pytest
@@ -20,6 +21,15 @@ def test_the_defaults_of_a_sensor_are_those_of_its_parts() -> None:
     assert item.sensor == Sensor(item.sensor.frustum)
     assert (item.sensor.polarity, item.sensor.thresholds) == (Polarity(), Thresholds())
     assert item.sensor.electronics == match_electronics(item.sensor.radial_ohms, item.sensor.angular_ohms)
+
+
+def test_the_tables_of_its_keys_are_what_a_scene_allows() -> None:
+    """Limits and defaults that a person reads there are those that count."""
+    spec = importlib.util.spec_from_file_location("reference", ROOT / "scripts" / "reference.py")
+    assert spec is not None
+    assert spec.loader is not None
+    spec.loader.exec_module(reference := importlib.util.module_from_spec(spec))
+    assert reference.page("scene.md") == DOCUMENT
 
 
 def test_there_are_four_examples() -> None:

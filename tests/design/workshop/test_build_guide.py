@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
-from coneskin.design.workshop.build_figures import LOOP, BuildFigures, bill_of_materials, measure_build
+from coneskin.design.workshop.build_figures import BuildFigures, bill_of_materials, measure_build
 from coneskin.design.workshop.build_guide import common_lines, sheet_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable
@@ -114,7 +114,8 @@ def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: floa
     for wire in figures.wires:
         across = abs(math.remainder(wire.phi - way.phi, 2 * math.pi)) * 0.054
         assert across < 0.03, "the tabs are beside each other, some across the seam"
-        assert 0.0 < wire.length - (across + way.connector_length + LOOP) < 0.02
+        needed = 8.0 + 1e3 * (across + way.connector_length) + 20.0 + 4.0  # mm; stripped, loop, in the contact
+        assert 1e3 * wire.length == pytest.approx(5.0 * math.ceil(needed / 5.0 - 1e-6)), "to the next 5 mm"
     assert way.connector_length == pytest.approx(0.06, abs=6e-3)
     assert way.tie_length == pytest.approx(0.03, abs=4e-3), "half way to the connector"
 
@@ -335,8 +336,14 @@ def test_the_bill_has_what_the_steps_use_up() -> None:
     plastic = sum(part.surface.volume for collar in figures.collars for part in collar.parts)
     assert items["PLA or PETG, for a 3D printer"].startswith(f"{1e6 * plastic:.0f} cm3")
     strap = items["hook-and-loop tape 15 to 20 mm wide"]
-    assert strap.startswith("2 pieces of ")
-    assert float(strap.split()[-2]) > 2e3 * math.pi * 0.05
+    assert strap == "2 pieces of 400 mm", "around the link, 314 mm, and 80 mm on itself"
+    assert items["masking tape 19 mm wide"] == "1 m"
+    assert items["self-adhesive cable-tie mount 19 x 19 mm and cable tie 2.5 mm"] == "1"
+    assert items["copper tape with electrically conductive adhesive, 6 x 12 mm"] == "4"
+    edges = [s.outline.length for k in (1, 5) for part in design.cuts[k].parts for s in part.strokes]
+    assert items["polyimide tape 0.03 mm, 10 mm wide"] == f"{math.ceil(5.0 * sum(edges)) / 10.0:.1f} m"
+    red = sum(1e3 * wire.length for wire in figures.wires if wire.electrode == "A")
+    assert items["stranded wire 0.14 mm2, red"] == f"{red:.0f} mm"
     sheet = next(item for name, item in items.items() if name.startswith("conductive sheet"))
     assert "a strip of 20 x 120 mm to measure" in sheet, "step 2 measures a strip of it"
     faces = sum(part.area for cut in design.cuts if cut.number in (1, 3, 5) for part in cut.parts)

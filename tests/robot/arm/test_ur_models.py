@@ -62,8 +62,39 @@ def test_limits_are_symmetric_and_only_small_arms_turn_wrist_3_without_end(name:
     assert math.isinf(arm.joint_upper[5]) == (name in ("UR3", "UR3e"))
 
 
-def test_speeds_of_the_ur20_are_those_of_its_manual() -> None:
-    assert [round(math.degrees(v)) for v in arm_model("UR20").joint_speed] == [120, 120, 150, 210, 210, 210]
+#: user manuals, and joint_limits.yaml of ros-industrial/universal_robot [deg/s]
+SPEEDS = {
+    (180, 180, 180, 360, 360, 360): "UR3, UR3e",
+    (180, 180, 180, 180, 180, 180): "UR5, UR5e, UR7e",
+    (120, 120, 180, 180, 180, 180): "UR10, UR10e, UR12e, UR16e",
+    (180, 180, 240, 300, 300, 300): "UR8 Long, UR15, UR18",
+    (120, 120, 150, 210, 210, 210): "UR20, UR30",
+}
+
+
+@pytest.mark.parametrize("speeds", SPEEDS, ids=SPEEDS.values())
+def test_speeds_and_limits_are_those_of_the_manual(speeds: tuple[int, ...]) -> None:
+    for name in SPEEDS[speeds].split(", "):
+        arm = arm_model(name)
+        assert [round(math.degrees(v), 6) for v in arm.joint_speed] == list(speeds), name
+        assert [round(math.degrees(v), 6) for v in arm.joint_upper[:5]] == [360, 360, 180, 360, 360], name
+        assert math.degrees(arm.joint_upper[5]) == (math.inf if name in ("UR3", "UR3e") else 360.0), name
+
+
+#: default_kinematics.yaml of ros-industrial/universal_robot: d1, a2, a3, d4, d5, d6 [m]; the others: test_kinematics
+LENGTHS = {
+    "UR8 Long": (0.2186, -0.8989, -0.7149, 0.1824, 0.1361, 0.1434),
+    "UR15": (0.2186, -0.6475, -0.5164, 0.1824, 0.1361, 0.1434),
+    "UR18": (0.2186, -0.475, -0.3389, 0.1824, 0.1361, 0.1434),
+    "UR7e": (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996),
+    "UR12e": (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655),
+}
+
+
+@pytest.mark.parametrize("name", LENGTHS)
+def test_lengths_are_those_of_the_maker(name: str) -> None:
+    arm, (d1, a2, a3, d4, d5, d6) = arm_model(name), LENGTHS[name]
+    assert (arm.a, arm.d) == ((0.0, a2, a3, 0.0, 0.0, 0.0), (d1, 0.0, 0.0, d4, d5, d6))
 
 
 def test_calibration_adds_to_each_column_and_leaves_the_rest() -> None:
