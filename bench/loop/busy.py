@@ -7,6 +7,10 @@ skin is touched at random times. Program, guard, driver process and loops run as
 cores. Controller and skin stand for hardware of their own: they come first where this is started as root, as nobody
 else could let them. ``--hold`` lets the program sort for so many seconds at a time, with Python's lock held.
 
+A processor of a virtual machine stands still while its host gives it no time. The simulated hardware on it does so too,
+and no program can prevent it. A thread that comes before all others sees that on each, and a stop in or within
+STALL_REACH after more than STALL s of it is counted apart.
+
 A touch counts as late where the arm stands later than the budget that its scene gives a stop: v / a and four times
 ``escalate_ms``, counted from the touch, plus 20 ms for the frames that show it.
 """
@@ -40,6 +44,31 @@ SPEED, ACCELERATION, DECELERATION = 1.0, 2.0, 10.0
 BUDGET = SPEED / DECELERATION + 4.0 * ESCALATE + 0.02  # s; from a touch to the arm that stands
 LEADING_SIDE = 1.55  # rad
 BUSY_LOOP = "while True: pass"
+STALL, STALL_REACH = 0.02, 0.3  # s
+
+
+class StallWatch(threading.Thread):
+    """Thread before all others on one processor, which sees when nothing at all runs there; needs the right to it."""
+
+    def __init__(self, processor: int) -> None:
+        super().__init__(name=f"stall watch {processor}", daemon=True)
+        self.stalls: list[tuple[float, float]] = []  # end and length [s]
+        self._processor = processor
+
+    def run(self) -> None:
+        os.sched_setaffinity(0, {self._processor})
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90))
+        last = time.monotonic()
+        while True:
+            time.sleep(0.001)
+            now = time.monotonic()
+            if now - last > STALL:
+                self.stalls.append((now, now - last))
+            last = now
+
+    def near(self, at: float) -> bool:
+        """Tell whether the processor stood still at a time [s], or shortly before."""
+        return any(0.0 <= at - (end - length) <= length + STALL_REACH for end, length in self.stalls)
 
 
 def without_rights(*arguments: str) -> list[str]:
@@ -115,6 +144,9 @@ def main() -> None:
     args = parser.parse_args()
     print(head("ur-rtde"))
     rng, events, touches = random.Random(args.seed), list[dict[str, Any]](), list[float]()
+    watches = [StallWatch(processor) for processor in sorted(os.sched_getaffinity(0))]
+    for watch in watches:
+        watch.start()
     with ExitStack() as stack:
         folder = args.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder.mkdir(exist_ok=True)
@@ -159,11 +191,16 @@ def main() -> None:
             print(run.errors)
         stood = [event["monotonic"] for event in controller.events("standstill")]
         moved = [e["monotonic"] for e in controller.events("motion") if e["kind"] != "StopJoints"]
-    judge(events, touches, stood, moved, CLOCK() - began)
+    judge(events, touches, stood, moved, CLOCK() - began, watches)
 
 
 def judge(
-    events: list[dict[str, Any]], touches: list[float], stood: list[float], moved: list[float], seconds: float
+    events: list[dict[str, Any]],
+    touches: list[float],
+    stood: list[float],
+    moved: list[float],
+    seconds: float,
+    watches: list[StallWatch],
 ) -> None:
     """Print how long each touch took, and what else has stopped the arm."""
     stops = [event for event in events if event["name"] == "stopping"]
@@ -182,7 +219,9 @@ def judge(
         times.append(end - touched)
         late += [end - touched] if end - touched > BUDGET else []
     others = [s for s in stops if s["stop"] not in explained]
-    needless = [s for s in others if "; then " not in s["why"]]  # the others repeat the stop of an arm that stands
+    alone = [s for s in others if "; then " not in s["why"]]  # the others repeat the stop of an arm that stands
+    needless = [s for s in alone if not any(watch.near(s["at"]) for watch in watches)]
+    stalls = [length for watch in watches for _, length in watch.stalls]
     rows = [
         ["minutes", f"{seconds / 60.0:.1f}"],
         ["moves that arrived", sum(e["name"] == "arrived" for e in events)],
@@ -192,7 +231,10 @@ def judge(
         ["... longest", f"{1e3 * max(times, default=0.0):.0f} ms"],
         [f"... later than {1e3 * BUDGET:.0f} ms", len(late)],
         ["further stop paths used", sum(e["name"] == "escalated" for e in events)],
-        ["stops repeated on a standing arm", len(others) - len(needless)],
+        ["stops repeated on a standing arm", len(others) - len(alone)],
+        [f"times a processor stood still for more than {1e3 * STALL:g} ms", len(stalls)],
+        ["... longest", f"{1e3 * max(stalls, default=0.0):.0f} ms"],
+        ["stops at such a time", len(alone) - len(needless)],
         ["stops without a touch", len(needless)],
     ]
     show("Pick and place beside busy loops", ["", "value"], rows)

@@ -88,21 +88,34 @@ def speeds(path: Path, name: str) -> Iterator[str]:
 
 
 def _dask(path: Path) -> Iterator[str]:
-    """Yield how fast two workers of a local Dask cluster replay the run, each four times, by the clock."""
+    """Yield how fast one and two workers of a local Dask cluster replay the run, each four times, by the clock."""
     try:
         from distributed import Client, LocalCluster
     except ImportError as exc:
         yield f"exact replay, Dask: {exc.name} is not installed"
         return
-    with LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
-        client.gather(client.map(_once, [str(path)] * 2, pure=False))  # they import
-        wall = time.perf_counter()
-        times = client.gather(client.map(_once, [str(path)] * 8, pure=False))
-        wall = time.perf_counter() - wall
-    each = sum(length / took for length, took in times) / len(times)
-    clock = sum(length for length, _ in times) / wall
-    rate = f"{2 * each:.1f} times real time of the processors, {clock:.1f} by the clock"
-    yield f"exact replay, Dask with two workers: {rate}"
+    rates = []
+    for workers in (1, 2):
+        with LocalCluster(workers, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+            client.gather(client.map(_once, [str(path)] * 2 * workers, pure=False))  # they import
+            wall = time.perf_counter()
+            times = client.gather(client.map(_once, [str(path)] * 4 * workers, pure=False))
+            rates.append(sum(length for length, _ in times) / (time.perf_counter() - wall))
+    with ProcessPoolExecutor(2) as pool:  # what this machine's second core is worth: two that only count
+        alone = pool.submit(_count).result()
+        both = max(pool.map(_count, [0, 0]))
+    yield (
+        f"exact replay, Dask: one worker {rates[0]:.1f} times real time by the clock, two {rates[1]:.1f}: "
+        f"{rates[1] / rates[0]:.2f} times one (two loops that only count: {2 * alone / both:.2f} times one)"
+    )
+
+
+def _count(_: int = 0) -> float:
+    """Return the time by the clock in which a loop counts to ten million [s]."""
+    began = time.perf_counter()
+    for _ in range(10_000_000):
+        pass
+    return time.perf_counter() - began
 
 
 def _once(path: str) -> tuple[float, float]:
