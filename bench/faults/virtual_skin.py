@@ -8,6 +8,7 @@ A line of JSON in, a line of JSON with the time out::
     {"slow": 1.0}                        from now on frames take so much longer to arrive, more with each
     {"touches": [{"u": 0.13, "phi": 1.5, "after": 0.0, "duration": 0.2, "force": 5.0, "rise": 0.01, "sensor": ""}]}
     {"unplug": true}  {"plug": true}     the port goes away, and comes back under the same name
+    {"anew": true}                       what is said of late frames begins anew
 
 Each answer also says how late the machine has made a frame at worst.
 """
@@ -115,6 +116,8 @@ class FaultySkin:
                 case "plug":
                     self._plug()
         say(at=at, late=self._worst_late)
+        if "anew" in request:
+            self._worst_late = 0.0
 
     def _touch(self, start: float, duration: float, **values: Any) -> None:
         self._skin.touch(ScriptedTouch(start, start + duration, **values))
