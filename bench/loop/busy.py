@@ -219,7 +219,7 @@ def judge(
         if stop is None or end is None:
             unseen += 1
             continue
-        explained.add(stop["stop"])
+        explained |= {stop["stop"]} if stop["at"] >= touched else set()
         if max((at for at in stood if at < stop["at"]), default=0.0) > max(
             (at for at in moved if at < stop["at"]), default=0.0
         ):
