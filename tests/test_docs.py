@@ -211,7 +211,7 @@ class PageRun:
             child.send_signal(signal.SIGINT)
         for command, child in self._running:
             try:
-                child.communicate(timeout=20.0)
+                child.communicate(timeout=TIMEOUT)
             except subprocess.TimeoutExpired:
                 child.kill()
                 child.communicate()

@@ -32,10 +32,10 @@ def test_a_child_gets_its_end(tmp_path, monkeypatch):
     child = spawn("echo_child", b)
     ours = Channel(a)
     ours.send(b"abc")
-    assert wait_readable([ours], 20.0)
+    assert wait_readable([ours], 60.0)
     assert ours.receive() == [b"cba"]
     ours.close()
-    assert child.wait(20) == 0
+    assert child.wait(60) == 0
 
 
 def test_a_child_that_cannot_start_is_said(monkeypatch):
@@ -65,10 +65,10 @@ def test_a_child_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
     child = spawn("coneskin.session.skin_process", b)
     ours = Channel(a)
     ours.send(encode_json({"scene": forearm_scene(), "name": "scene.toml", "folder": str(tmp_path)}))
-    assert wait_readable([ours], 20.0)
+    assert wait_readable([ours], 60.0)
     assert b"port" in ours.receive()[0]  # it has imported everything
     ours.close()
-    assert child.wait(20) == 1
+    assert child.wait(60) == 1
     assert not (tmp_path / "ran").exists()
 
 
@@ -98,7 +98,7 @@ def start_parent(said, tmp_path):
         "child = spawn('waiting_child', b)\n"
         "ours = Channel(a)\n"
         f"ours.send({said!r})\n"
-        "wait_readable([ours], 20.0)\n"
+        "wait_readable([ours], 60.0)\n"
         "copy = ctypes.CDLL(None).fork()\n"  # nothing of ours runs in it
         "while copy == 0: time.sleep(600.0)\n"
         "print(child.pid, copy, flush=True)\n"
@@ -143,13 +143,13 @@ def test_a_child_that_starts_ends_with_the_channel_and_one_that_works_looks_for_
     ours, theirs = map(Channel, pair())
     Lifeline(theirs, None, lambda: (ended.append("at the start"), over.set()))
     ours.close()
-    assert over.wait(20.0)
+    assert over.wait(60.0)
     theirs.close()
     ours, theirs = map(Channel, pair())
     working = Lifeline(theirs, None, lambda: ended.append("at work"))
     working.hold()
     ours.close()
-    working._thread.join(20.0)
+    working._thread.join(60.0)
     assert not working._thread.is_alive()
     assert ended == ["at the start"]
     theirs.close()

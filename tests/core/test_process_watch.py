@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="on
 
 
 def until(what):
-    end = time.monotonic() + 30.0
+    end = time.monotonic() + 60.0
     while not what():
         assert time.monotonic() < end
 

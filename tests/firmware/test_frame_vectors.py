@@ -100,7 +100,7 @@ def test_the_c_header_writes_them_on_this_machine(header):
     words = ["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-function"]
     source = ["-I", str(firmware_folder() / "coneskin"), "-o", str(header / "vectors"), str(header / "vectors.c")]
     subprocess.run([*words, *source], check=True, timeout=60)
-    sent = subprocess.run([str(header / "vectors")], check=True, capture_output=True, timeout=10).stdout
+    sent = subprocess.run([str(header / "vectors")], check=True, capture_output=True, timeout=60).stdout
     assert sent == b"".join(data for _, data in frames_of_file())
 
 

@@ -63,7 +63,7 @@ def stream(send):
     """Send a command again and again, until it raises."""
 
     def run(arm):
-        for step in range(600):
+        for step in range(6000):  # a minute
             send(arm, step * 0.01)
             time.sleep(0.01)
 

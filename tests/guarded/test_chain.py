@@ -217,14 +217,14 @@ def test_a_protective_stop_is_never_unlocked(controller):
 def test_a_controller_that_is_not_there_is_one_clear_line():
     scene = parse_scene(scene_text(free_host()))
     with pytest.raises(RobotConnectionError, match=r"cannot reach the controller 127\..*Connection refused"):
-        guard(scene, start_timeout=10.0).__enter__()
+        guard(scene, start_timeout=60.0).__enter__()
 
 
 @pytest.mark.long
 def test_a_port_that_is_not_there_is_one_clear_line(controller):
     scene = scene_for(controller, {'kind = "virtual"': 'kind = "serial"\nport = "/dev/ttyNOWHERE"'})
     with pytest.raises(SkinConnectionError, match="/dev/ttyNOWHERE"):
-        guard(scene, start_timeout=10.0).__enter__()
+        guard(scene, start_timeout=60.0).__enter__()
 
 
 @pytest.mark.long
@@ -239,15 +239,15 @@ def test_a_second_guard_on_the_same_arm_gives_up_at_once(controller):
     with guard(scene_for(controller)) as first:
         begun = time.monotonic()
         with pytest.raises(RobotRefused, match=r"another (guard on this computer has|program controls) the arm"):
-            guard(scene_for(controller), start_timeout=60.0).__enter__()
-        assert time.monotonic() - begun < 50.0, "it waited for what cannot come"
+            guard(scene_for(controller), start_timeout=300.0).__enter__()
+        assert time.monotonic() - begun < 250.0, "it waited for what cannot come"
         first.check()
 
 
 @pytest.mark.long
 def test_another_arm_than_the_scenes_is_refused(controller):
     with pytest.raises(RobotRefused, match=r"is no UR10e: .* UR5e"):
-        guard(scene_for(controller, {"UR5e": "UR10e"}), start_timeout=20.0).__enter__()
+        guard(scene_for(controller, {"UR5e": "UR10e"}), start_timeout=60.0).__enter__()
 
 
 @pytest.mark.long

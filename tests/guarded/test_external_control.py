@@ -72,7 +72,9 @@ def send(host, port, text):
             with sock.makefile() as lines:  # one reader: its buffer may hold both lines
                 lines.readline()
                 assert lines.readline() == "Starting program\n"
-        time.sleep(0.05)  # a connection that closes at once may lose what was sent
+        sock.shutdown(socket.SHUT_WR)
+        while sock.recv(65536):  # closed before the controller has read all, the connection loses what was sent
+            pass
 
 
 class Child:

@@ -123,7 +123,7 @@ def test_comply_gives_way_and_latches_when_the_push_ends(controller):
 @pytest.mark.parametrize("revive", [True, False])
 def test_the_arm_never_starts_by_itself_when_the_control_program_starts_again(controller, revive):
     """The register still says speedJ, and a program that starts again executes it: without our care it does."""
-    for _ in range(5):  # the wheel itself is late now and then: nothing runs, or it has cleared the register
+    for _ in range(20):  # the wheel itself is late now and then: nothing runs, or it has cleared the register
         got = wheel.run("start_again_after_a_stop", controller.host, revive)
         assert not (revive and got["moved"]), got
         if got["runs"] and got["moved"] is not revive:

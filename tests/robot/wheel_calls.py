@@ -20,7 +20,7 @@ from coneskin.robot.ur.ur_rtde import UrArm
 Joints = list[float]
 
 
-def _until(condition: Callable[[], bool], limit: float = 20.0) -> bool:
+def _until(condition: Callable[[], bool], limit: float = 60.0) -> bool:
     deadline = time.monotonic() + limit
     while not condition():
         if time.monotonic() > deadline:

@@ -154,6 +154,6 @@ def test_the_fixtures(project: Project) -> None:
         "    assert abs(events[0].u - 0.2) < 2e-3\n\n\n"
         "def test_a_controller(ur_controller):\n"
         "    import socket\n\n"
-        "    socket.create_connection((ur_controller.host, 30004), timeout=5).close()\n"
+        "    socket.create_connection((ur_controller.host, 30004), timeout=60).close()\n"
     )
     assert "3 passed" in project.pytest(code=0)

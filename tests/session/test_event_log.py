@@ -212,12 +212,12 @@ def test_a_function_that_blocks_delays_nobody_and_is_told_what_it_has_missed(cap
 
     def block(event):
         took.set()
-        free.wait(20.0)
+        free.wait(60.0)
         seen.append(event)
 
     delivery = _EventDelivery(block, bound=5)
     delivery.put(numbered(0))
-    assert took.wait(20.0)
+    assert took.wait(60.0)
     delivery.put(numbered(*range(1, 20)))  # returns, though nobody takes them
     with caplog.at_level(logging.WARNING, "coneskin"):
         free.set()
@@ -254,7 +254,7 @@ def test_the_function_itself_may_end_the_session():
 
     delivery = _EventDelivery(close)
     delivery.put(numbered(1))
-    assert done.wait(20.0)
+    assert done.wait(60.0)
 
 
 @pytest.mark.parametrize("request_", [3, 4])

@@ -37,7 +37,7 @@ class SocketViewer:
 
         self.socket.send(msgspec.msgpack.encode(message))
 
-    def hear(self, timeout: float = 20.0) -> list[dict[str, Any]]:
+    def hear(self, timeout: float = 60.0) -> list[dict[str, Any]]:
         """Return the messages of the next parcel."""
         import msgspec
         import zstandard

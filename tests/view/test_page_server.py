@@ -27,7 +27,7 @@ def server() -> Iterator[PageServer]:
 
 
 def get(server: PageServer, path: str, **headers: str) -> tuple[int, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", int(server.url.rpartition(":")[2]), timeout=20)
+    connection = http.client.HTTPConnection("127.0.0.1", int(server.url.rpartition(":")[2]), timeout=60)
     connection.putrequest("GET", path, skip_host="Host" in headers)
     for name, value in headers.items():
         connection.putheader(name, value)
@@ -71,7 +71,7 @@ def send_too_much(socket: Any) -> None:
     """Send a message that is too long and receive until the server has had enough; it may have had so before."""
     socket.send(bytes(1 << 17))
     while True:
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
 
 
 def viewer(server: PageServer, **more: Any) -> Any:
@@ -83,27 +83,27 @@ def test_a_page_of_another_origin_may_not_look_in(server: PageServer) -> None:
     with pytest.raises(InvalidStatus, match="403"):
         viewer(server, origin="http://elsewhere.example")
     with viewer(server, origin=server.url) as socket:  # type: ignore[arg-type]
-        assert socket.recv(timeout=20)
+        assert socket.recv(timeout=60)
 
 
 def test_a_message_that_a_page_has_no_use_for_does_nothing(server: PageServer) -> None:
     """Among them the one that has viser open a tunnel to the internet."""
     before = server.gate.refused
     with viewer(server) as socket:
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         for kind in ("ShareUrlRequest", "FileTransferStartUpload", "SetPositionMessage", "ResetGuiMessage"):
             socket.send(msgspec.msgpack.encode({"type": kind, "name": "/run", "position": [9.0, 9.0, 9.0]}))
         socket.send(b"\xc1 garbage")
         socket.send("text")
         socket.send(msgspec.msgpack.encode([1, 2, 3]))
-        socket.ping().wait(20)
+        socket.ping().wait(60)
     assert server._server._share_tunnel is None
     assert server.gate.refused == before + 7
 
 
 def test_a_viewer_who_sends_nonsense_is_gone_and_leaves_nothing(server: PageServer) -> None:
     with viewer(server) as socket:
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         socket.send(msgspec.msgpack.encode({"type": "ViewerCameraMessage", "wxyz": "x"}))
         with pytest.raises(ConnectionClosed):
             send_too_much(socket)
@@ -113,14 +113,14 @@ def test_a_viewer_who_sends_nonsense_is_gone_and_leaves_nothing(server: PageServ
 def test_a_thread_that_draws_never_wakes_the_readers_itself(server: PageServer) -> None:
     """It would end now and then, by an error of a list that changes meanwhile."""
     with viewer(server) as socket:
-        socket.recv(timeout=20)
+        socket.recv(timeout=60)
         (client,) = (state.message_buffer for state in server._server._websock_server._client_state_from_id.values())
         for buffer in (server._server._websock_server._broadcast_buffer, client):
             buffer.message_event.clear()
             buffer.message_event.set()
             assert not buffer.message_event.is_set()
         server.scene.add_frame("/drawn", show_axes=False)
-        assert socket.recv(timeout=20)
+        assert socket.recv(timeout=60)
 
 
 def test_an_address_that_is_not_ours_is_refused() -> None:

@@ -101,7 +101,7 @@ def test_a_process_that_a_library_has_frozen_ends_all_the_same(keeps_lock):
             said += guard.receive()
             assert child.poll() is None
         guard.close()
-        assert child.wait(20.0) == 1
+        assert child.wait(60.0) == 1
     finally:
         child.kill()
         child.wait()

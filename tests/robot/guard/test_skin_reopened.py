@@ -262,7 +262,7 @@ def test_a_real_port_that_comes_back_is_read_again(session, tmp_path: Path):
         ends = list(open_raw_terminal())
         link.symlink_to(ends.pop())
         loop.poll(0.0)
-        reopenings[0]._thread.join(10.0)
+        reopenings[0]._thread.join(60.0)
         loop.poll(0.0)
         os.write(ends[0], b"after")
         loop.poll(2.0)

@@ -25,7 +25,7 @@ def translator() -> Iterator[Compiler]:
 
 
 def result(translator: Compiler) -> Result:
-    deadline = time.monotonic() + 30.0
+    deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
         if found := translator.results():
             return found[0]

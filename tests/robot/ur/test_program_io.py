@@ -19,11 +19,10 @@ def controller():
 
 
 def until(what):
-    for _ in range(2000):
-        if what():
-            return
+    end = time.monotonic() + 60.0
+    while not what():
+        assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.005)
-    raise AssertionError("it did not happen in time")
 
 
 def until_refused(read):

@@ -18,7 +18,7 @@ from coneskin.robot.ur.rtde_connection import RtdeConnection, StateReader
 from coneskin.robot.ur.stop_sockets import StopSockets
 from tests.support.served_controller import served
 
-PATIENCE = 30.0  # s; a slow machine is no failure
+PATIENCE = 60.0  # s; a slow machine is no failure
 ZEROS = (0.0,) * 6
 Q = (0.1, -1.2, 1.3, -1.4, -1.5, 0.6)
 
@@ -141,10 +141,9 @@ def test_a_read_only_connection_is_told_by_the_answer_to_a_stop(controller):
             controller.call("remote control")
         assert stops.use(StopPath.PROGRAM, 5.0)
         refused = []
-        for _ in range(50):  # states come ten times a second
+        while not refused:
             select.select([stops.sockets()["program"]], (), (), PATIENCE)
-            if refused := stops.drain():
-                break
+            refused = stops.drain()
         assert [name for name, _, _ in refused] == ["program"]
         assert "is read-only (C210)" in refused[0][2]
         assert "Choose Remote Control" in refused[0][2]
@@ -284,7 +283,7 @@ def test_a_peer_that_is_no_controller_is_one_clear_line(answers, close, error, w
 def test_the_end_of_the_connection_is_an_error_and_not_silence():
     with (
         Peer(ACCEPTED, TYPES, rtde_codec.pack(ord("S"), b"\x01")) as peer,
-        StateReader(peer.host, timeout=1.0) as reader,
+        StateReader(peer.host, timeout=60.0) as reader,
         pytest.raises(RobotConnectionError, match="has closed the connection"),
     ):
         reader.wait(60.0)

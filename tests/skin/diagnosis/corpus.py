@@ -136,7 +136,7 @@ def build(folder: Path) -> Path:
 
 def bytes_of(program: Path, mistake: str, seconds: float = 2.0) -> list[tuple[float, bytes]]:
     """What a mistake sends, with the times at which it would come."""
-    done = subprocess.run([program, mistake, str(seconds)], capture_output=True, check=True, timeout=20)
+    done = subprocess.run([program, mistake, str(seconds)], capture_output=True, check=True, timeout=60)
     return list(_records(done.stdout))
 
 

@@ -34,7 +34,7 @@ class Absent(Source):
 def test_it_is_closed_once_and_tried_for_ten_minutes_until_it_is_there(opens_at, attempts):
     source, waits = Absent(opens_at), []
     reopening = SourceReopening(source, wait=lambda time: bool(waits.append(time)))
-    reopening._thread.join(10.0)
+    reopening._thread.join(60.0)
     assert reopening.done
     assert reopening.opened is (attempts == opens_at)
     assert source.calls == ["close", *["open"] * attempts]

@@ -160,7 +160,7 @@ class EmulatedBoard(Openable):
         if process is not None and process.stdin is not None:
             with contextlib.suppress(BrokenPipeError):
                 process.stdin.close()  # it ends with its standard input
-            process.wait(10.0)
+            process.wait(60.0)
 
 
 def _words(

@@ -12,7 +12,7 @@ import pytest
 
 from tests.robot.sim.program_bench import Bench
 
-PATIENCE = 30.0  # s that a test waits for a program
+PATIENCE = 60.0  # s that a test waits for a program
 
 
 class Handler(SimpleXMLRPCRequestHandler):

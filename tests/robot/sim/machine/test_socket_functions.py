@@ -15,7 +15,7 @@ from coneskin.robot.sim.machine.script_host import _MAX_READS, _MAX_UNREAD
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.urscript.translator import translate
 
-PATIENCE = 5.0  # s that a read of the test waits
+PATIENCE = 60.0  # s that a read of the test waits
 
 
 class Peer:
