@@ -1,13 +1,16 @@
 """Sheets for the places on a link: a link on which nothing fits is refused with its reason."""
 
 import re
+from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.sheet_design import design_sheets
+from coneskin.design.sheets.sheet_design import DesignOptions, _check_wrap, design_sheets
 from coneskin.design.sheets.summary import design_summary
+from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.frustum import Frustum
@@ -26,6 +29,16 @@ def test_a_link_on_which_no_cone_fits_has_no_sheet_to_design() -> None:
         design_sheets(fit)
     with pytest.raises(GeometryError, match="there is no sheet to design: no place was given"):
         design_sheets([])
+
+
+@pytest.mark.parametrize(("radius", "strain"), [(9.4e-3, 39), (8.6e-3, 41)])
+def test_foam_is_strained_by_two_fifths_at_most(radius: float, strain: int) -> None:
+    """12 mm of it on a link of 9 mm: half of that over the radius of its middle."""
+    first, *others = PAPER_STACK.layers
+    stack = replace(PAPER_STACK, layers=(replace(first, thickness=12e-3), *others))
+    assert round(100.0 * 6e-3 / (radius + 6e-3)) == strain
+    with nullcontext() if strain < 40 else pytest.raises(GeometryError, match=f"strained by .{strain}% .*at most 40%"):
+        _check_wrap(PlacedFrustum(Frustum(radius, radius, 0.1)), DesignOptions(stack=stack))
 
 
 @pytest.mark.parametrize(("taper", "straight"), [(8e-6, True), (-30e-6, True), (60e-6, False)])

@@ -44,6 +44,36 @@ def test_the_parts_can_be_bought():
         assert parts.supply_volts in (2.5, 2.048, 1.25, 1.024, 0.512)
 
 
+#: IEC 60063
+E24 = "1.0 1.1 1.2 1.3 1.5 1.6 1.8 2.0 2.2 2.4 2.7 3.0 3.3 3.6 3.9 4.3 4.7 5.1 5.6 6.2 6.8 7.5 8.2 9.1"
+
+
+def test_pulldowns_are_twice_the_larger_sheet_and_of_every_value_of_e24():
+    for k in range(24):  # each is met from just below, from 10 kohm to 91 kohm
+        wanted = 1e4 * float(E24.split()[k])
+        assert match_electronics(100.0, 0.4999 * wanted).pulldown_ohms == pytest.approx(wanted)
+    assert match_electronics(100.0, 100.0).pulldown_ohms == 10e3
+    assert match_electronics(100.0, 1e6).pulldown_ohms == 100e3
+
+
+@pytest.mark.parametrize(
+    ("adc", "supply"), [(5.1, 3.0), (5.13, 4.096), (3.74, 2.5), (3.76, 3.0), (3.1, 2.048), (3.2, 2.5)]
+)
+def test_the_supply_is_the_largest_reference_within_four_fifths_of_the_converters_range(adc, supply):
+    assert match_electronics(1e3, 1e3, GivenElectronics(adc_volts=adc)).supply_volts == supply
+
+
+@pytest.mark.parametrize(("ohms", "supply"), [(48.1, 2.5), (47.9, 2.048), (23.1, 1.25), (18.4, 0.512), (18.6, 1.024)])
+def test_no_sheet_draws_more_than_50_ma(ohms, supply):
+    assert match_electronics(ohms, 1e3).supply_volts == supply  # beside leads of 2 ohm
+
+
+def test_the_range_of_the_current_is_2_2_times_the_larger_one_at_a_gain_of_50():
+    parts = match_electronics(998.0, 998.0)  # 2.5 mA
+    assert 2.2 * 2.5e-3 < parts.current_full_scale < 1.03 * 2.2 * 2.5e-3
+    assert parts.current_full_scale == pytest.approx(3.3 / (50.0 * 11.8))
+
+
 def test_a_sheet_that_would_draw_too_much_gets_a_lower_supply():
     assert match_electronics(1000.0, 1000.0).supply_volts == 2.5
     assert match_electronics(30.0, 1000.0).supply_volts == 1.25  # 78 mA at 2.5 V, 64 mA at 2.048 V, 39 mA at 1.25 V

@@ -248,6 +248,40 @@ def test_marks_to_touch_are_in_the_table_and_on_the_drawing() -> None:
         assert math.dist((x, y), (label.x, label.y)) < 8e-3
 
 
+def test_what_a_person_reads_is_what_the_design_says_in_the_units_that_are_printed() -> None:
+    design, figures = built(CONE, wires="end1", upper_sheet_ohms=500.0, lower_sheet_ohms=2000.0)
+    common = "\n".join(common_lines([design], [figures]))
+    for said in (
+        "a square of 40 mm with a square hole of 20 mm",
+        "half of (hole - square + 20 mm). These files have 0 mm",
+        "within 20% of the table's",
+        "strip 8.0 mm of each wire",
+        "fold that half (6.0 mm) over them",
+        "walls of 3.0 mm solid",
+        "the gap to both is 0.3 mm",
+    ):
+        assert said in common, said
+    rows = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", "\n".join(sheet_lines(design, figures, ".")), re.MULTILINE))
+    cone, way = design.cuts[0].surface, design.way
+    sine = (cone.radius2 - cone.radius1) / cone.slant
+    chord = 2.0 * cone.radius1 / sine * math.sin(0.5 * cone.wrap * sine)  # of the sector
+    along = f"{1e3 * cone.slant:.1f} mm from end 1 to end 2 along an edge"
+    assert rows["part 1"] == f"{along}, {1e3 * chord:.1f} mm straight between the corners of end 1"
+    assert rows["conductive sheet"] == "2000 ohm per square (part 3), 500 ohm per square (part 5)"
+    assert rows["pins"] == f"3 of {1e3 * design.layout.plan.hole:.1f} mm less 0.1 mm"
+    gap = 2.0 * math.pi * 0.15 / CONE.slant * 0.05  # of tape of 50 um around the cone, once for each of three layers
+    assert rows["seam"] == f"opens by {gap:.1f} mm for each layer of tape, at most {3.0 * gap:.1f} mm at part 7"
+    beyond = [-1e3 * float(way.surface[index][0]) for index in (way.tie, -1)]
+    lies = [f"the {what} lies {u:.1f} mm beyond end 1" for what, u in zip(("tie", "connector"), beyond, strict=True)]
+    assert all(said in rows["cable"] for said in lies)
+    assert f"{1e3 * way.tie_length:.1f} mm along the cable" in rows["cable"]
+    assert rows["cable"].endswith(f"{1e3 * way.connector_length:.1f} mm along the cable")
+    for name, pair in zip(("A-B", "C-D"), figures.pairs, strict=True):
+        value, unit = re.match(r"([\d.]+) (k?ohm) for", rows[name]).groups()  # type: ignore[union-attr]
+        assert float(value) * (1e3 if unit == "kohm" else 1.0) == pytest.approx(pair.ohms, rel=0.01)
+    assert rows["upper_sheet_ohm"].startswith(f"reading 1-2 divided by {figures.pairs[0].squares:.4f}, nominally ")
+
+
 def ending_at(low: float, high: float) -> Mesh:
     """A tube of 50 mm about z that ends at two heights."""
     tube = bumped(None)

@@ -13,6 +13,7 @@ from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDes
 from coneskin.design.workshop.build_figures import measure_build
 from coneskin.design.workshop.jig import Collar, _CollarPart, _LinkExcess, _lip_play, jig_collars
 from coneskin.design.workshop.placement import find_placement
+from coneskin.geometry.drawing.surface_shape import ShapeTab
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
@@ -42,13 +43,13 @@ def in_part_frame(design: SheetDesign, collar: Collar, points: np.ndarray) -> np
     return np.column_stack([x, sign * y, sign * (z - step) + plan.reach])
 
 
-def tube(bump: float | None = None) -> Mesh:
+def tube(bump: float | None = None, top: float = 0.08) -> Mesh:
     """A tube of 50 mm about z from -0.03 to 0.25; beyond 0.207 a block of 40 deg stands out at an azimuth."""
     phi = np.linspace(0, 2 * math.pi, 361)[:-1]
     z = np.array([-0.03, 0.0, 0.1, 0.2069, 0.207, 0.25])
     radius = np.full((6, 360), 0.05)
     if bump is not None:
-        radius[4:, np.abs((phi - bump + math.pi) % (2 * math.pi) - math.pi) < math.radians(20)] = 0.08
+        radius[4:, np.abs((phi - bump + math.pi) % (2 * math.pi) - math.pi) < math.radians(20)] = top
     corners = np.stack([radius * np.cos(phi), radius * np.sin(phi), z[:, None] + 0.0 * phi], axis=-1)
     index = np.arange(6 * 360).reshape(6, 360)
     a, b = index[:-1], np.roll(index, -1, axis=1)[:-1]
@@ -204,6 +205,59 @@ def test_facets_of_a_mesh_do_not_show_where_a_collar_belongs() -> None:
     facets = 0.05 * (1.0 - math.cos(math.pi / 12.0))
     assert _lip_play(link, lips, 0.015, 0.3e-3) is not None
     assert _lip_play(link, lips, 0.015, 0.3e-3, facets) is None
+
+
+@pytest.mark.parametrize(
+    ("room", "said"),
+    [
+        (0.4, "end 1 lies where the link ends"),
+        (0.7, "end 1 lies 0.7 mm before the outermost place of the link"),
+        (4.2, "end 1 lies 4.2 mm before the outermost place of the link"),
+        (4.4, "flush"),
+        (40.2, "flush"),
+        (40.4, ""),
+    ],
+)
+def test_a_lip_holds_from_4_mm_on_and_is_flush_up_to_40(room: float, said: str) -> None:
+    """Less the clearance of 0.3 mm."""
+    design = sheet(Frustum(0.05, 0.05, 0.1), Pose(translation=(0.0, 0.0, -0.03 + 1e-3 * room)))
+    (collar, *_), without = jig_collars(design, tube())
+    if room < 4.3:
+        assert collar.end == 2
+        assert without[0].startswith(said)
+    else:
+        assert (collar.end, collar.flush) == (1, said == "flush")
+
+
+@pytest.mark.parametrize(("rise", "stopped"), [(7.9e-3, False), (8.1e-3, True)])
+def test_what_stands_out_by_more_than_8_mm_is_not_gripped(rise: float, stopped: bool) -> None:
+    collars, _ = jig_collars(sheet(Frustum(0.05, 0.05, 0.2)), tube(bump=1.0, top=0.05 + rise))
+    assert collars[1].stopped is stopped
+
+
+def test_printed_sizes_are_those_of_the_workshop() -> None:
+    """Clearance 0.3, wall 3, slots of 4, rims of 2 x 1.5 beside a strap, notches of 1, 8 mm above tabs: all in mm."""
+    design = sheet(Frustum(0.05, 0.05, 0.2), wires="end1")
+    one, two = jig_collars(design)[0]
+    outside = 0.05 + design.options.stack.thickness
+    for collar in (one, two):
+        first, second = collar.parts
+        assert second.start - first.end == pytest.approx(4e-3 / outside)
+    x, y, z = 1e3 * two.parts[0].surface.vertices.T
+    lip, sleeve, seat, rim = 50.3, 56.3, 59.3, 60.8
+    assert {*np.round(np.hypot(x, y), 3)} == {lip, lip + 3.0, lip + 2.0, sleeve, seat, rim, seat - 1.0, rim - 1.0}
+    assert {0.0, 2.0, 18.0, 20.0, 35.0} <= {*np.round(z, 3)}, "rims of the strap's seat, the step, and the lip of 15"
+    x, y = np.concatenate([part.surface.vertices[:, :2] for part in one.parts]).T
+    above = np.isclose(np.hypot(x, y), 0.058)
+    azimuths = np.degrees(np.arctan2(-y[above], x[above]))  # turned over
+    tabs = [
+        math.degrees(math.remainder(step.phi, math.tau))
+        for foil in design.layout.foils.values()
+        for step in foil
+        if isinstance(step, ShapeTab)
+    ]
+    room = math.degrees((0.5 * design.layout.plan.lead + 3e-3) / 0.05)
+    assert (azimuths.min(), azimuths.max()) == pytest.approx((min(tabs) - room, max(tabs) + room), abs=1.0)
 
 
 def test_no_part_has_an_undercut() -> None:

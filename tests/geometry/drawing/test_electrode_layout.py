@@ -1,6 +1,7 @@
 """Electrodes, leads, tabs and holes: what touches what, and what must not."""
 
 import math
+from contextlib import nullcontext
 from itertools import combinations
 
 import numpy as np
@@ -253,3 +254,10 @@ def test_mistakes_are_said():
         lay_out_sheet(SHEETS["disc"], ElectrodePlan(tab=55e-3))
     with pytest.raises(GeometryError, match="four tabs of 4 mm do not fit on end1"):
         lay_out_sheet(Frustum(0.05, 0.05, 0.2, math.radians(35.0)))
+
+
+@pytest.mark.parametrize(("height", "active"), [(0.0249, False), (0.0251, True)])
+def test_a_millimetre_between_the_electrodes_is_a_sensor_and_less_is_none(height, active):
+    """Margins and electrodes of 6 mm on both sides take 24 mm."""
+    with nullcontext() if active else pytest.raises(GeometryError, match="leave less than 1 mm active"):
+        lay_out_sheet(Frustum(0.05, 0.05, height), ElectrodePlan(setback=1e-3))

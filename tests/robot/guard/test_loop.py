@@ -11,6 +11,7 @@ from coneskin.core.channel import Channel, pair
 from coneskin.core.errors import SkinConnectionError
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
+from coneskin.robot.guard import loop as module
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts, _Outbox
 from coneskin.robot.guard.phase import Phase
 from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
@@ -98,6 +99,75 @@ def test_a_guard_that_was_suspended_says_so_to_its_core_before_anything_else(end
     loop.poll(0.0)
     assert core.taken == [BlockKind.SUSPENDED, BlockKind.TICK]
     loop._close()
+
+
+@pytest.mark.pure  # its core is a stub
+@pytest.mark.parametrize(
+    ("late", "told"),
+    [
+        (0.019, []),
+        (0.021, [BlockKind.OVERRUN]),
+        (0.99, [BlockKind.OVERRUN]),
+        (1.01, [BlockKind.OVERRUN, BlockKind.SUSPENDED]),
+    ],
+)
+def test_20_ms_between_two_rounds_are_recorded_and_a_second_is_told_to_the_core(ends, late, told):
+    core, now, recorded = Core(), [10.0], []
+    loop = GuardLoop(core, GuardPorts(ends[0], None), lambda: now[0], lambda: now[0])
+    loop._record = recorded.append
+    loop._open()
+    loop.poll(0.0)
+    recorded.clear()
+    now[0] += late
+    loop.poll(0.0)
+    assert [block.kind for block in recorded if block.kind is not BlockKind.TICK] == told
+    loop._close()
+
+
+def test_what_can_be_read_has_a_bit_each():
+    names = ("SKIN", "READER", "DRIVER", "WATCHDOG", "SLIDER", "HEARTBEAT", "STOPS", "SESSION", "SECOND")
+    assert sorted(getattr(module, f"_{name}") for name in names) == [1 << k for k in range(len(names))]
+
+
+@pytest.mark.pure  # its core is a stub
+@pytest.mark.parametrize(("gone", "seconds"), [(False, 3.0), (True, 0.8)])
+def test_at_its_end_it_waits_for_the_arm_to_stand(ends, gone, seconds):
+    core, now = Core(), [10.0]
+    core.phase = Phase.STOPPING
+
+    def clock():
+        now[0] += 0.001
+        return now[0]
+
+    loop = GuardLoop(core, GuardPorts(ends[0], None), clock, clock)
+    loop._open()
+    if gone:
+        ends[1].close()
+        loop.poll(0.0)
+    began = now[0]
+    loop._end()
+    assert now[0] - began == pytest.approx(seconds, abs=0.05)
+    loop._close()
+
+
+@pytest.mark.pure  # its core is a stub
+def test_four_times_a_second_the_controller_is_asked_and_a_helper_is_looked_at_once_it_misses_two_beats(ends):
+    core, now, stops, asked = Core(), [10.0], Talkative(), []
+    stops.ask = lambda: asked.append(now[0])
+    helpers = {"driver": SimpleNamespace(waits=lambda since: True)}
+    loop = GuardLoop(core, GuardPorts(ends[0], None, stops=stops, helpers=helpers), lambda: now[0], lambda: now[0])
+    loop._open()
+    held_up = []
+    for _ in range(1000):
+        now[0] += 0.001
+        core.taken.clear()
+        loop.poll(0.0)
+        held_up += [now[0]] * (BlockKind.HELD_UP in core.taken)
+    assert asked == pytest.approx([10.27, 10.55, 10.82], abs=0.03)  # with the next heartbeat, each 30 ms
+    assert held_up[0] == pytest.approx(10.075, abs=0.015)
+    loop._close()
+    stops.near.close()
+    stops.far.close()
 
 
 @pytest.mark.pure  # its core is a stub

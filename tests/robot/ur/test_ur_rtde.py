@@ -4,7 +4,7 @@ import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
-from coneskin.robot.ur.ur_rtde import Mode, _rtde_errors
+from coneskin.robot.ur.ur_rtde import Mode, _rtde_errors, stop_time
 
 from .fake_wheel import arm, stops
 
@@ -82,3 +82,17 @@ def test_tool_and_payload_are_set_only_while_nothing_moves(start):
     a.control.accepts = False
     with pytest.raises(RobotRefused, match="did not take setPayload"):
         a.set("set_payload", 1.0, [0.0] * 3)
+
+
+def test_a_tool_of_zeros_is_none_and_no_packet_of_a_wrong_size():
+    a = arm()
+    a.ask("getForwardKinematics", [0.1] * 6)
+    name, q, tool = a.control.calls[-1]
+    assert (name, q) == ("getForwardKinematics", [0.1] * 6)
+    assert 0.0 < max(map(abs, tool)) < 1e-9
+
+
+@pytest.mark.parametrize(("deceleration", "seconds"), [(10.0, 0.65), (2.0, 2.05), (1.0, 3.3), (0.0, 3.3)])
+def test_a_stop_has_the_time_that_a_joint_of_3_5_rad_per_s_takes_and_0_3_s_more(deceleration, seconds):
+    """0.65 s at 10 rad/s2: docs/safety.md. However gentle it is, it has 3 s to brake."""
+    assert stop_time(deceleration) == pytest.approx(seconds)
