@@ -25,7 +25,6 @@ xyz_mm = [0, 0, 80]
 
 [source]
 kind = "virtual"
-rate_hz = 200
 
 [reaction]
 kind = "retreat"

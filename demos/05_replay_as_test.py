@@ -2,7 +2,7 @@
 
     python demos/05_replay_as_test.py [RUN]      RUN: folder of a run, as `coneskin demo` writes it
 
-Without RUN it first guards a virtual skin without an arm for half a second, and records that into a temporary folder.
+Without RUN it first guards a virtual skin without an arm for a second, and records that into a temporary folder.
 """
 
 import sys
@@ -24,8 +24,8 @@ height_mm = 434
 kind = "virtual"
 
 [[source.touch]]
-start_s = 0.3
-end_s = 0.5
+start_s = 0.6
+end_s = 0.8
 u_mm = 200
 phi_deg = 90
 

@@ -30,6 +30,7 @@ height_mm = 240
 [source]
 kind = "virtual"
 model = "ladder"
+rate_hz = 1000
 [monitoring]
 skin_silence_ms = 1000
 skin_late_ms = 1000

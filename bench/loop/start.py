@@ -41,6 +41,7 @@ radius2_mm = 37.2
 height_mm = 260
 [source]
 kind = "virtual"
+rate_hz = 1000
 """
 _START_PROGRAM = """
 import json

@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from coneskin.core.errors import RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import StatusReport
 from coneskin.robot.driver.protocol import HeartbeatDriver, SliderDriver, require
 from coneskin.robot.stop.limits import MonitoringLimits
+from coneskin.robot.stop.state_age import MAX_SUPERVISION_LAG
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchEvent
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.stream import TouchStream
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 #: kept, because each look at a member of an enumeration takes Python 3.11 0.2 us
 _STARTING, _ACTIVE, _SLOWED, _RETREATING = Phase.STARTING, Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING
-_MIN_STALL = 0.02  # s between two looks, from which on the guard itself was held up
+MIN_STALL: Final = 0.02  #: s between two looks, from which on the guard itself was held up
 
 
 class _StallClock:
@@ -54,15 +55,13 @@ class _StallClock:
         """Return the time by which silences are judged at a host time [s]. To be asked continuously."""
         looked, longest, until = self._held_up
         stall = now - looked
-        if _MIN_STALL < stall < math.inf:
+        if MIN_STALL < stall < math.inf:
             longest = stall if now >= until else max(stall, longest)
             until = now + longest
         self._held_up = now, longest, until
         return now - longest if now < until else now
 
 
-#: s; a skin that is this far behind does not show what a motion away presses on, however late a scene lets it be
-_MAX_SUPERVISION_AGE = 0.05
 _Decoded = TypeVar("_Decoded")
 
 
@@ -158,16 +157,22 @@ class GuardCore:
                 f"another device is on the skin's port: it sends as device/sensor {sent}, guarded was {expected}; plug "
                 "in the one that was there"
             )
+        waiting: dict[str, list[str]] = {}  # what is said of several sensors is said once
         for detector in self._stream.detectors:
-            name, fault, age = detector.sensor.name, detector.fault, detector.age(now)
+            fault, age, what = detector.fault, detector.age(now), ""
             if age == math.inf and fault in {None, Fault.SILENT}:
-                blockers.append(f"{name}: waits for its first valid frame; if none comes, check power and cable")
+                what = "waits for its first valid frame; if none comes, check power and cable"
             elif age > self._limits.skin_silence:
-                blockers.append(f"{name}: no valid frame" + (f" ({fault.value})" if fault else ""))
+                what = Fault.SILENT.value
+                if fault is not None and fault is not Fault.SILENT:
+                    what = f"no valid frame ({fault.value})"
             elif detector.touched:
-                blockers.append(f"{name}: it is touched, or its layers are stuck together")
+                what = "it is touched, or its layers are stuck together"
             elif not detector.ready:
-                blockers.append(f"{name}: {fault.value if fault else 'settling'}")
+                what = fault.value if fault else "settling"
+            if what:
+                waiting.setdefault(what, []).append(detector.sensor.name)
+        blockers += [f"{', '.join(names)}: {what}" for what, names in waiting.items()]
         return blockers if self._arm is None else blockers + self._arm.blockers(now)
 
     # ---- the skin
@@ -232,10 +237,10 @@ class GuardCore:
         """Return whose frames are too old to supervise a motion away by. Empty where none are."""
         for detector in self._stream.detectors:
             age = detector.timing.measured_age(now)
-            if age > _MAX_SUPERVISION_AGE:
+            if age > MAX_SUPERVISION_LAG:
                 return (
                     f"{detector.sensor.name}: what it measured {1e3 * age:.0f} ms ago is too old to move away by "
-                    f"({1e3 * _MAX_SUPERVISION_AGE:.0f} ms at most; a busy computer needs fewer frames a second)"
+                    f"({1e3 * MAX_SUPERVISION_LAG:.0f} ms at most; a busy computer needs fewer frames a second)"
                 )
         return ""
 

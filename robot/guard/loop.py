@@ -35,7 +35,7 @@ from coneskin.skin.sources.source import Source, SourceReopening
 
 from .companion_monitor import HELPER_NAMES
 from .controller_heartbeat import heartbeat_count
-from .core import GuardCore
+from .core import MIN_STALL, GuardCore
 from .phase import Phase
 from .signals.journal import BlockKind, Command, GuardEvent, Output, encode_command, encode_loss
 
@@ -126,7 +126,6 @@ _QUESTION_PERIOD = 0.25  # s between two questions whether the controller takes 
 _TICK_PERIOD = 0.002  # s between two looks at the clocks where nothing else happens
 _LOOK_PERIOD = 0.0015  # s between two looks at what is no skin, where frames come: every second one of 1 kHz
 _REPORT_PERIOD = 0.01  # s between two reports to the session where nothing was decided
-_OVERRUN_TIME = 0.02  # s between two rounds, from which on the loop reports that it was held up
 _SUSPENSION_TIME = 1.0  # s between two rounds, from which on nobody has guarded; the driver process waits half of it
 _FLUSH_TIMEOUT = 1.0  # s that the recorder has to take what waits for it
 _SHUTDOWN_TIMEOUT = 3.0  # s that the arm has to stand when the guard is told to end
@@ -263,7 +262,7 @@ class GuardLoop:
         ready = self._wait(timeout)
         ports, (before, sleepless_before) = self._ports, self._round
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
-        if now - before > _OVERRUN_TIME or sleepless - sleepless_before > _SUSPENSION_TIME:
+        if now - before > MIN_STALL or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)
         stopping, skin = self._core.phase.stopping, ports.source if ready & _SKIN or self._blind else None
         if skin is not None and not stopping:
@@ -316,7 +315,7 @@ class GuardLoop:
 
     def _note_overrun(self, now: float, late: float, asleep: float) -> None:
         """Report how late this round is, to the core as well where nobody has guarded meanwhile."""
-        if late > _OVERRUN_TIME:
+        if late > MIN_STALL:
             self._record(Block(BlockKind.OVERRUN, now, json.dumps({"late": late}).encode()))
         if asleep > _SUSPENSION_TIME:
             self._feed(BlockKind.SUSPENDED, b"%.3f" % asleep)

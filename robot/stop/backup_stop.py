@@ -28,7 +28,7 @@ _STOP_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.PRO
 _REOPEN_PERIOD = 0.05  # s between two attempts to open what is missing while a stop is under way
 _REPEAT_PERIOD = 1.0  # s between two stops while no state comes
 _BLIND_TIMEOUT = 2.0  # s without a state after which a stop is given up, and the reader opened anew
-_CONNECT_TIMEOUT = 0.5  # s that opening the reader may take
+CONNECT_TIMEOUT = 0.5  #: s that opening a port may take; what takes longer is tried again
 
 
 class _HoldPhase(Enum):
@@ -174,19 +174,19 @@ class StandstillHold:
 
     def states_missing(self, time: float = 0.0) -> bool:
         """Tell whether no new state has come for a time [s], or else so long that the arm's motion is unknown."""
-        return self._age.silent(self._clock(), time or max(2.0 * self._limits.arm_silence, _CONNECT_TIMEOUT))
+        return self._age.silent(self._clock(), time or max(2.0 * self._limits.arm_silence, CONNECT_TIMEOUT))
 
     def _reconnect(self) -> None:
         """Open what is missing; where a stop path comes back, a stop goes through it."""
         if self._connections.reopen():  # what was sent over the old ones may be lost
             self.append(UseStopPath(StopPath.PROGRAM, self._deceleration))
         now = self._clock()
-        timeout = _CONNECT_TIMEOUT if self.reader is None else _BLIND_TIMEOUT
+        timeout = CONNECT_TIMEOUT if self.reader is None else _BLIND_TIMEOUT
         if now - max(self._age.newest.fresh_at, self._opened) < timeout:
             return
         self._close_reader()
         with suppress(ConeSkinError):  # the next look tries again
-            self.reader = self._driver.state_reader(self._connections.host, _CONNECT_TIMEOUT).__enter__()
+            self.reader = self._driver.state_reader(self._connections.host, CONNECT_TIMEOUT).__enter__()
         self._opened = self._clock()
 
     def rest(self) -> list[tuple[ControllerState, float]]:

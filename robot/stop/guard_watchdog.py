@@ -24,12 +24,11 @@ from coneskin.robot.driver.liveness import BEAT_PERIOD, GUARD_SILENCE, UNGUARDED
 from coneskin.robot.driver.messages import LEAVE, Release, Shutdown, StatusReport, StopProgram, decode_command
 from coneskin.robot.driver.protocol import PayloadReader, load_driver
 
-from .backup_stop import StandstillHold
+from .backup_stop import CONNECT_TIMEOUT, StandstillHold
 from .limits import MonitoringLimits
 
 _POLL_PERIOD = 0.01  # s between two looks
 _STOP_POLL_PERIOD = 0.002  # s; while a stop is under way
-_CONNECT_TIMEOUT = 0.5  # s for each port of the second one; what takes longer is tried again
 _ORPHAN_TIME = 1.0  # s without program and states, from which on stops reach nobody: none stays for 2 s ...
 _LONELY_TIME = 0.6  # s without the guard, in which a stop is tried all the same, by connections that are opened first
 
@@ -130,7 +129,7 @@ def main(arguments: list[str]) -> int:
     try:
         driver, second = load_driver(settings["driver"]), bool(settings.get("second"))
         with ExitStack() as stack:
-            connections, reader = driver.stop_connections(host, _CONNECT_TIMEOUT), None
+            connections, reader = driver.stop_connections(host, CONNECT_TIMEOUT), None
             if not second:
                 connections = stack.enter_context(driver.stop_connections(host))
                 reader = stack.enter_context(driver.state_reader(host))

@@ -14,7 +14,8 @@ from coneskin.robot.driver.values import ControllerState
 
 _OFFSET_WINDOW: Final = 5.0  # s; at 100 ppm the clocks part by 1 ms in two of them
 _MAX_STEP_AHEAD: Final = 0.25  # s by which a state may gain on the host's clock; more is no queue that is read out
-_MAX_SUPERVISION_LAG: Final = 0.05  # s; of states that show where a motion away has got, whatever silence is allowed
+#: s; of what shows where a motion away has got and what it presses on, states or frames, whatever silence is allowed
+MAX_SUPERVISION_LAG: Final = 0.05
 _LAG_TIME: Final = 0.02  # s for which they must be as late
 
 
@@ -72,7 +73,7 @@ class StateAge:
         fresh_at, late, very_late = last.fresh_at, last.late_since, last.very_late_since
         if fresh:
             fresh_at, lag = host, host - measured_at
-            late = min(late, host) if lag > _MAX_SUPERVISION_LAG else math.inf
+            late = min(late, host) if lag > MAX_SUPERVISION_LAG else math.inf
             very_late = min(very_late, host) if lag > self._limit else math.inf
         stamp = controller, fresh, fresh_at, measured_at, stepped, late, very_late
         self.newest = tuple.__new__(_StateStamp, stamp)  # quicker than _StateStamp()
@@ -95,5 +96,5 @@ class StateAge:
         """Return why they cannot supervise a motion away at a host time [s]. Empty where they can."""
         if now - self.newest.late_since <= _LAG_TIME:
             return ""
-        limit = f"{1e3 * _MAX_SUPERVISION_LAG:.0f} ms"
+        limit = f"{1e3 * MAX_SUPERVISION_LAG:.0f} ms"
         return f"the controller's states come more than {limit} late, too late to move away by"

@@ -17,9 +17,9 @@ from coneskin.core.errors import RobotRefused
 from coneskin.core.files import read_file
 from coneskin.core.finding import Finding, Verdict
 from coneskin.core.text import read_json
+from coneskin.robot.driver.liveness import MAX_ESCALATE
 
 _MAX_SIZE = 1 << 20  # bytes
-_MOST_MS = 500  # of escalate_ms in a scene
 _LIMIT_MARGIN = 1.2  # times what was measured, for a limit that shall hold
 MEASURED_DECELERATION = 10.0  #: rad/s2 of the stops by program that the script measures
 _WATCHDOG_LATENESS = 0.02  # s, that the simulated controller's never reaches
@@ -91,10 +91,10 @@ def compare(
         found.append(Finding(f"measured, {item}", "ok" if fits else wrong, value, rule, "" if fits else remedy))
 
     value = f"it shows after {1e3 * shows:.0f} ms (worst); a program starts after {1e3 * start:.0f} ms (p95)"
-    needed = math.ceil(1e3 * _LIMIT_MARGIN * shows)
+    needed, most = math.ceil(1e3 * _LIMIT_MARGIN * shows), 1e3 * MAX_ESCALATE
     remedy = f"escalate_ms = {needed} in [monitoring]; else each stop goes on to the next path"
-    if needed > _MOST_MS:
-        remedy = f"escalate_ms can be {_MOST_MS:g} at most: ask what holds controller or network up, and measure again"
+    if needed > most:
+        remedy = f"escalate_ms can be {most:g} at most: ask what holds controller or network up, and measure again"
     judge("a stop", shows <= escalate, value, f"{1e3 * escalate:g} ms", remedy, "bad")
     value = f"it ends a program {1e3 * late:.0f} ms after its period (worst)"
     rule = f"{1e3 * _WATCHDOG_LATENESS:g} ms, or {1e3 * _WATCHDOG_TIME:g} ms with the period"

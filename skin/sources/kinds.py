@@ -58,7 +58,7 @@ SOURCE_KINDS: dict[str, SourceKind] = {
         "coneskin.skin.sources.serial_port:SerialPort",
         with_meanings(
             """
-            rate_hz: frames per second of each sensor
+            rate_hz: frames per second of each sensor; a board sends as many
             seed: seed of the noise
             model: `field`: the exact field in both sheets, so that an extended contact reads with its area error.
                 `ladder`: ideal resistors, without numpy
@@ -67,7 +67,7 @@ SOURCE_KINDS: dict[str, SourceKind] = {
             wires: electrodes on the terminals A, B, C, D. Another order is a wrong wiring, to try `coneskin doctor`
             touch: scripted touches, each under `[[source.touch]]`
             """,
-            Key("rate_hz", float, 1000.0, low=1.0, high=10_000.0),
+            Key("rate_hz", float, 200.0, low=1.0, high=10_000.0),
             Key("seed", int, 0, low=0, high=2**31),
             Key("model", str, "field", choices=("field", "ladder")),
             Key("frame_length", int, 36, choices=(36, 40, 52)),

@@ -140,7 +140,8 @@ def test_one_scene_takes_the_sensors_of_all_links(
     for name, number in (("upper_arm_link", 0), ("forearm_link", 1)):
         assert f"| sensor number | {number} |" in (tmp_path / "skin" / name / "report.md").read_text()
     assert "rate_hz" not in (tmp_path / "scene.toml").read_text(), "two sensors find room on one line"
-    for count, rate in ((3, 200), (6, 100), (9, 100)):
+    assert "rate_hz" not in _virtual(read_designs(tmp_path / "skin")[0], 3), "nor do three ask for less than a board's"
+    for count, rate in ((4, 150), (6, 100), (9, 100)):
         assert f"rate_hz = {rate} " in _virtual(read_designs(tmp_path / "skin")[0], count)
     assert main(["init", "skin", "--skin-only", "--port", "/dev/null", "-o", "alone.toml"]) == 0
     alone = tomllib.loads((tmp_path / "alone.toml").read_text())

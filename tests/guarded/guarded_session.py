@@ -52,7 +52,7 @@ def scene_text(host, changes=None, control="internal"):
     for old, new in (changes or {}).items():
         assert old in text, old
         text = text.replace(old, new)
-    return text.replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 200')  # as a board; 1000 are work for nothing
+    return text
 
 
 def scene_for(simulated, changes=None, control="internal"):

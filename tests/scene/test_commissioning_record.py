@@ -232,11 +232,11 @@ STOP_WITH_RULE = VIRTUAL_RETREAT.replace('kind = "retreat"', 'kind = "stop"') + 
 @pytest.mark.parametrize("text", sweep([VIRTUAL_RETREAT, STOP_WITH_RULE]), ids=["retreat", "a rule that complies"])
 def test_without_a_record_the_arm_only_stops_and_says_so(text: str, tmp_path: Path) -> None:
     scene = scene_in(tmp_path, text)
-    touch = ScriptedTouch(0.3, 0.5, 0.2, 2.5, sensor="upper arm skin")
+    touch = ScriptedTouch(0.6, 0.8, 0.2, 2.5, sensor="upper arm skin")
     told = {}
     for name, known_scene in (("bare", with_commissioning(scene, 0.0)), ("commissioned", commissioned(scene))):
         core, outputs = build_core(known_scene), []
-        for block in inputs(known_scene, touch, 0.6):
+        for block in inputs(known_scene, touch, 0.9):
             core.feed(block, outputs)
         told[name] = [output for output in outputs if isinstance(output, GuardEvent)]
     assert "not_commissioned" not in [event.name for event in told["commissioned"]]

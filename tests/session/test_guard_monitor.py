@@ -142,5 +142,5 @@ def test_what_is_wrong_with_the_skins_line_is_said_while_the_guard_waits(channel
     assert log.wait_for(("guard_exited",), 60.0)
     theirs.close()
     monitor.close()
-    lines = [event.details["what"] for event in log.events if event.name == "skin_line"]
-    assert lines == ["the checksum, because no frame"] * said
+    lines = [(event.time, event.details["what"]) for event in log.events if event.name == "skin_line"]
+    assert lines == [(1.0, "the checksum, because no frame")] * said  # as old as what it explains

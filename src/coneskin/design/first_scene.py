@@ -245,10 +245,9 @@ def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
 
 def _virtual(design: DesignFolder, count: int) -> str:
     cone = design.sensors[0].frustum
-    share = max(_LINE_RATE // count, _SENSOR_RATE)
-    rate = f"rate_hz = {share}               # of each sensor: one line carries them all\n"
+    rate = f"rate_hz = {max(_LINE_RATE // count, _SENSOR_RATE)}    # of each: one line carries them all\n"
     return (
-        f'[source]\nkind = "virtual"\n{rate if count > 2 else ""}\n'
+        f'[source]\nkind = "virtual"\n{rate if count > 3 else ""}\n'
         f"[[source.touch]]\nstart_s = {_TOUCH_START:g}\nend_s = {_TOUCH_END:g}\n"
         f"u_mm = {0.5e3 * cone.slant:.1f}\nphi_deg = {math.degrees(0.5 * cone.wrap):.1f}\n"
     )

@@ -108,9 +108,9 @@ class EventLog:
         """Record with what a virtual skin is touched; any thread may say so."""
         self._truths.append(Block(BlockKind.TRUTH, time.monotonic(), json.dumps(facts).encode()))
 
-    def report(self, name: EventName, **details: Any) -> None:
-        """Add an event of the session's own."""
-        self._write([GuardEvent(name, time.monotonic(), details).block()])
+    def report(self, name: EventName, at: float | None = None, **details: Any) -> None:
+        """Add an event of the session's own, of now or of a host time [s]."""
+        self._write([GuardEvent(name, time.monotonic() if at is None else at, details).block()])
 
     def wait_for(
         self,
@@ -292,12 +292,12 @@ class _HeardLine:
         """Return what is wrong with the line, where a guard waits for its skin.
 
         Args:
-            reasons: why the guard waits or refuses; those of a sensor begin with its name.
+            reasons: why the guard waits or refuses; those of sensors begin with their names.
 
         Returns:
             a sentence; empty where the reasons are others, and where frames come as they should.
         """
-        names = tuple(f"{item.sensor.name}: " for item in scene.sensors)
+        names = tuple(item.sensor.name + mark for item in scene.sensors for mark in ":,")
         if scene.source is None or not any(reason.startswith(names) for reason in reasons):
             return ""
         from coneskin.skin.diagnosis.capture import Capture

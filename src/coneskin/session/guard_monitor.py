@@ -100,7 +100,7 @@ class GuardMonitor:
         """Say what is wrong with the skin's line, where the guard still waits for it."""
         waiting = next((e for e in reversed(self._log.events) if e.name == EventName.WAITING), None)
         if not self._log.activated and waiting is not None and (words := self._describe_line(reasons(waiting))):
-            self._log.report(EventName.SKIN_LINE, what=words)
+            self._log.report(EventName.SKIN_LINE, waiting.time, what=words)  # a busy guard's next event may be older
 
     def _is_active(self) -> bool:
         """Tell whether the guard has become active and has not begun to end."""

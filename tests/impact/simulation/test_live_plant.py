@@ -51,8 +51,7 @@ _PATIENT = (
 
 
 def scene_at(host: str) -> Scene:
-    text = forearm_scene(host, limits=_PATIENT).replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 200')
-    text = text.replace("[arm]", "[arm]\nwatchdog_hz = 1")
+    text = forearm_scene(host, limits=_PATIENT).replace("[arm]", "[arm]\nwatchdog_hz = 1")
     return parse_scene(text + _HAND)
 
 

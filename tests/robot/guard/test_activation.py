@@ -9,6 +9,7 @@ from coneskin.robot.guard.signals.journal import BlockKind, GuardEvent
 from coneskin.robot.reaction.types import Reaction
 from coneskin.skin.virtual.circuit import WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection
+from tests.support.exploration.guard_world import GuardWorld, Settings
 from tests.support.guard_rig import GuardRig, touch
 
 
@@ -47,6 +48,22 @@ def test_a_short_from_the_start_is_named_although_no_valid_frame_came():
     shorted = FaultInjection(wiring=WiringFaults(shorts=(("A", "B"),)), wiring_after=0)
     rig = GuardRig(faults=shorted).run(1.2)
     assert any("one: no valid frame (too much drive" in line for line in rig.event("waiting").details["reasons"])
+
+
+def test_what_holds_of_several_sensors_is_said_once():
+    reasons = GuardWorld(Settings(sensors=2)).core.blockers(0.0)
+    assert reasons[0] == "one, two: waits for its first valid frame; if none comes, check power and cable"
+    assert not any("frame" in reason for reason in reasons[1:])
+
+
+def test_a_sensor_that_falls_silent_is_said_to_in_one_sentence():
+    world = GuardWorld(Settings())
+    world.act("wait")
+    world.act("skin mute")
+    world.act("wait for a change")
+    assert "one: no valid frame has come for too long: check power, cable and frame rate" in world.core.blockers(
+        world.now
+    )
 
 
 def test_only_the_number_of_the_release_that_waits_is_its_acknowledgement():

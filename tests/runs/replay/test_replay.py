@@ -120,7 +120,7 @@ def test_a_damaged_touch_is_not_the_same(run: Run) -> None:
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     path = tmp_path_factory.mktemp("short") / "run.rec"
-    record(path, SKIN_ONLY.replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 200'))
+    record(path, SKIN_ONLY)
     return path.read_bytes()
 
 
