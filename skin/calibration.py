@@ -54,7 +54,6 @@ class PlaceMap:
             along.
         around: b0 to b5, of the fraction around: the same.
         note: where it comes from, for people.
-        sheet_ohms: what the untouched sheets had per square when it was made, upper and lower [ohm]; empty: not known.
 
     Raises:
         SensorError: there are not 6 numbers, one is beyond its limit in ``MAP_LIMITS``, or an end is an apex.
@@ -64,7 +63,6 @@ class PlaceMap:
     along: tuple[float, ...] = (0.0,) * 6
     around: tuple[float, ...] = (0.0,) * 6
     note: str = field(default="", compare=False)
-    sheet_ohms: tuple[float, ...] = ()
     _scale: LogScale = field(init=False, repr=False, compare=False)
     _live: tuple[float, ...] = field(init=False, repr=False, compare=False)  # what ``apply`` needs, to be had at once
 

@@ -82,6 +82,8 @@ class Sensor:
         place_map: what its calibration takes off the places that it reads; None where it has none.
         force_table: what force its level stands for; None where no calibration has shown it.
         tolerance: what is not ideal about its sheets and not taken off by its calibration.
+        known_ohms: what its untouched sheets had per square when touches last showed that its places are right, upper
+            and lower [ohm]; empty where nobody knows.
         bounds: its limits in counts, for the live path.
         b_positive: B, not A, is at the supply in the radial phase.
         c_positive: C, not D, is at the supply in the angular phase.
@@ -103,6 +105,7 @@ class Sensor:
     place_map: PlaceMap | None = None
     force_table: ForceTable | None = None
     tolerance: SheetTolerance = FILM_SHEETS
+    known_ohms: tuple[float, ...] = ()
     bounds: _Bounds = field(init=False, repr=False, compare=False)
     _from_end1: LogScale = field(init=False, repr=False, compare=False)
     _from_end2: LogScale = field(init=False, repr=False, compare=False)
@@ -124,7 +127,7 @@ class Sensor:
         if self.place_map is not None and self.place_map.frustum != cone:
             raise SensorError(f"place_map must be one of {cone}, got one of {self.place_map.frustum}")
         put = object.__setattr__
-        put(self, "name", self.name or f"sensor {self.device_id}/{self.sensor_id}")
+        put(self, "name", self.name or f"sensor {self.number}")
         put(self, "_from_end1", LogScale(cone.radius1, cone.radius2, cone.slant))
         put(self, "_from_end2", LogScale(cone.radius2, cone.radius1, cone.slant))
         if self.electronics is _MATCHED_ELECTRONICS:
@@ -133,6 +136,11 @@ class Sensor:
         put(self, "c_positive", self.polarity.angular == "C")
         put(self, "_wrap", cone.wrap)
         put(self, "bounds", self._work_out_bounds())
+
+    @property
+    def number(self) -> str:
+        """Device and sensor number, as 0/1."""
+        return f"{self.device_id}/{self.sensor_id}"
 
     @property
     def radial_ohms(self) -> float:
@@ -172,9 +180,8 @@ class Sensor:
         Returns:
             the radial and the angular potential over U0, in [0, 1].
         """
-        radial = (
-            self._from_end2.fraction(self._from_end2.length - u) if self.b_positive else self._from_end1.fraction(u)
-        )
+        end2 = self._from_end2
+        radial = end2.fraction(end2.length - u) if self.b_positive else self._from_end1.fraction(u)
         angular = phi / self._wrap
         return radial, angular if self.c_positive else 1.0 - angular
 

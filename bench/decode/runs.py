@@ -41,6 +41,7 @@ class Sitting:
         drift: standard deviation by which untouched currents may drift from one frame of a touch to the next, as the
             decoder is told, a ratio; 0: its own default.
         tolerance: of the sheets, as the decoder is told.
+        known: ohms per square of the untouched sheets when they were commissioned; empty: it is not told.
     """
 
     plant: FlatPlant
@@ -49,6 +50,7 @@ class Sitting:
     touches: np.ndarray
     drift: float = 0.0
     tolerance: SheetTolerance = IDEAL_SHEETS
+    known: tuple[float, ...] = ()
 
     def sensor(self) -> Sensor:
         """Return what the decoder is told; leads are 1 ohm by default."""
@@ -64,7 +66,7 @@ class Sitting:
         height = (plant.slant**2 - (plant.radius2 - plant.radius1) ** 2) ** 0.5
         cone = Frustum(plant.radius1, plant.radius2, height, plant.wrap)
         sheets = {"upper_sheet_ohms": plant.upper, "lower_sheet_ohms": plant.lower}
-        return Sensor(cone, electronics=parts, tolerance=self.tolerance, **sheets)
+        return Sensor(cone, electronics=parts, tolerance=self.tolerance, known_ohms=self.known, **sheets)
 
     def settings(self) -> DetectorSettings:
         """Return the settings of its detector."""

@@ -29,7 +29,6 @@ from bench.decode.runs import FRAME_PERIOD, LEARNED_FRAMES, Sitting, decode, pac
 from bench.report import head, quantile, show
 from coneskin.commissioning.calibration.calibrate import calibration_marks
 from coneskin.commissioning.examination.skin_examination import SkinStatistics, examine_sensor
-from coneskin.skin.calibration import PlaceMap
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, IDEAL_SHEETS, SheetTolerance
@@ -65,6 +64,7 @@ class Row:
         sheets: tolerance from which the sheets are drawn.
         leads: standard deviation of each lead [ohm].
         peeled: part of one electrode.
+        commissioned: the guard knows the untouched sheets as they were before it peeled off.
         speed: at which the contact slides [m/s].
         warmed: standard deviation by which the upper and the lower sheet change after learning, a ratio.
         stepped: least and most by which the upper sheet changes after learning, up or down, a ratio.
@@ -78,6 +78,7 @@ class Row:
     sheets: SheetTolerance = IDEAL_SHEETS
     leads: float = 0.0
     peeled: float = 0.0
+    commissioned: bool = False
     speed: float = 0.0
     warmed: tuple[float, float] = (0.0, 0.0)
     stepped: tuple[float, float] = (0.0, 0.0)
@@ -123,7 +124,11 @@ ROWS = (
     Row("patches 5 %", **_one(patches=0.05)),
     *(Row(f"silver line {value:g} ohm", **_one(line=value)) for value in (2.0, 10.0, 50.0)),
     Row("leads 5 ohm", told=SheetTolerance(lead=5.0), leads=5.0),
-    Row("20 % of an electrode peeled", told=FILM_SHEETS, peeled=0.2),
+    *(Row(f"{100 * part:g} % of an electrode peeled", told=FILM_SHEETS, peeled=part) for part in (0.2, 0.6)),
+    *(
+        Row(f"{100 * part:g} % peeled after commissioning", told=FILM_SHEETS, peeled=part, commissioned=True)
+        for part in (0.2, 0.25, 0.3, 0.6)
+    ),
     *(
         Row(f"both sheets {100 * v:g} % after learning", told=SheetTolerance(drift=v), warmed=(v, v))
         for v in (0.005, 0.02)
@@ -176,7 +181,10 @@ def measure(row: Row, skins: int) -> list[str]:
         sitting.touches = circuit.counts(frames, 1, noise)[:, :, 0]
         if row.peeled and not row.late:
             whole = circuit.counts(np.repeat(circuit.exact(intact)[None], LEARNED_FRAMES, 0), 1, noise)
-            names[_doctor(sensor, whole[:, 0], sitting.untouched)] += PLACE_COUNT
+            drawn = (float(np.mean(whole[:, 0, k] / whole[:, 0, 9])) for k in (5, 8))
+            ohms = sensor.sheet_ohms(*FrameInversion(sensor).untouched(*drawn))
+            names[_doctor(replace(sensor, known_ohms=ohms), sitting.untouched)] += PLACE_COUNT
+            sitting.known = ohms if row.commissioned else ()
         try:
             said = decode(sitting)
         except RuntimeError as error:
@@ -201,16 +209,13 @@ def measure(row: Row, skins: int) -> list[str]:
     return [row.name, off, held, f"{np.mean(certain):.2f}", ", ".join(told) or "-"]
 
 
-def _doctor(sensor: Sensor, before: np.ndarray, now: np.ndarray) -> str:
-    """Return what coneskin doctor names of a sensor that was calibrated with other untouched frames."""
-    drawn = (float(np.mean(before[:, k] / before[:, 9])) for k in (5, 8))
-    ohms = sensor.sheet_ohms(*FrameInversion(sensor).untouched(*drawn))
+def _doctor(sensor: Sensor, now: np.ndarray) -> str:
+    """Return what coneskin doctor names of a sensor whose untouched sheets are known."""
     seen = SkinStatistics(0.0)
     for number, counts in enumerate(now.tolist()):
         seen.add(FRAME_PERIOD * number, packet(number, counts))
-    calibrated = replace(sensor, place_map=PlaceMap(sensor.frustum, sheet_ohms=ohms))
-    found = examine_sensor(calibrated, seen.sensors[0, 0], 0.0, 0.1)
-    (named,) = (one for one in found if one.item.endswith("calibration"))
+    found = examine_sensor(sensor, seen.sensors[0, 0], 0.0, 0.1)
+    (named,) = (one for one in found if one.item.endswith("sheets"))
     return f"doctor: {named.remedy.partition(',')[0] or 'nothing'}"
 
 

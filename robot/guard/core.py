@@ -159,7 +159,7 @@ class GuardCore:
             )
         waiting: dict[str, list[str]] = {}  # what is said of several sensors is said once
         for detector in self._stream.detectors:
-            fault, age, what = detector.fault, detector.age(now), ""
+            fault, age, what = detector.fault, detector.timing.age(now), ""
             if age == math.inf and fault in {None, Fault.SILENT}:
                 what = "waits for its first valid frame; if none comes, check power and cable"
             elif age > self._limits.skin_silence:
@@ -450,3 +450,6 @@ class GuardCore:
         emit(out, EventName.ACTIVATED, now, request=self._activation.end())
         if self._not_commissioned:
             emit(out, EventName.NOT_COMMISSIONED, now, what=self._not_commissioned)
+        for one in self._stream.detectors:
+            if one.altered:
+                emit(out, EventName.MESSAGE, now, what=f"no place on {one.sensor.name} is certain: {one.altered}")

@@ -82,6 +82,7 @@ class Detector:
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
         reading_now: the newest valid frame while the sensor is touched, else None.
         timing: sequence and clocks, and counts of what was missing.
+        altered: how the untouched sheets are not what they were, so that no place is certain; empty while they are.
     """
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings | None = None) -> None:
@@ -94,6 +95,7 @@ class Detector:
             )
         self.timing = FrameTiming(self.settings.timing)
         self.ready = False
+        self.altered = ""
         self.reading_now: TouchReading | None = None
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
@@ -118,10 +120,6 @@ class Detector:
     def touched(self) -> bool:
         """True while a touch lasts."""
         return self.reading_now is not None
-
-    def age(self, now: float) -> float:
-        """Return the time since the newest valid frame [s]. Infinite before the first."""
-        return self.timing.age(now)
 
     def feed(self, frame: Frame, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
         """Take the next frame of this sensor.
@@ -231,9 +229,9 @@ class Detector:
         return self._fault
 
     @property
-    def untouched_sheets(self) -> tuple[float, float]:
-        """Conductances of the upper and the lower sheet, as the untouched frames of late have them [S]."""
-        return self._inversion.untouched(*self._currents.means[1:])
+    def untouched_ohms(self) -> tuple[float, float]:
+        """What the upper and the lower sheet have per square, as the untouched frames of late have them [ohm]."""
+        return self.sensor.sheet_ohms(*self._currents.sheets())
 
     def distrust(self, fault: Fault, now: float, detail: str) -> list[SkinEvent]:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.
@@ -284,7 +282,8 @@ class Detector:
         self._leak.feed(frame, whole)
         changed = self._currents.feed(frame, self.timing.period)
         if changed is not None:
-            self._places.altered |= changed[0] is Fault.CURRENT_CHANGED
+            if changed[0] is Fault.CURRENT_CHANGED:
+                self.altered = self._places.altered = changed[1]
             self._report(events, changed[0], frame, now, changed[1])
         if self._quiet >= settings.settle_frames and self._currents.means[0]:
             self.ready = True

@@ -163,5 +163,4 @@ class ReportedTouch:
 
     def _distance(self, u: float, phi: float) -> float:
         """Return the distance of two places that differ by this [m], never too small."""
-        around = abs(phi)
-        return math.hypot(u, self._radius * (around if around < math.pi else _FULL_TURN - around))
+        return math.hypot(u, self._radius * math.remainder(phi, _FULL_TURN))

@@ -20,7 +20,6 @@ from typing import NamedTuple
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame
 
-from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
 from .frame.reading import judge
 from .frame.untouched import UntouchedCurrents, bounded
@@ -240,9 +239,8 @@ def _observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> _Obse
         put_potentials(1.0 / supplies[phase], *guides[2 * phase : 2 * phase + 2])
         scale, current = unit / supplies[phase], currents[phase]
         values.append(current * scale)
-        weights.append(
-            1.0 / ((noise + rest + (_CURRENT_ERROR if learned else _UNLEARNED_CURRENT_ERROR) * current) * scale)
-        )
+        off = rest + (_CURRENT_ERROR if learned else _UNLEARNED_CURRENT_ERROR) * current
+        weights.append(1.0 / ((noise + off) * scale))
         highest.append(full * scale)
     if frame.driven is not None:
         for phase in (0, 1, 2):
@@ -347,12 +345,8 @@ class FaultDiagnosis:
         return most / self._sensor.electronics.full_count
 
     def _next(self, frame: Frame) -> _Fit:
-        _, radial, angular = self._currents.means
-        upper, lower = 1.0 / self._sensor.radial_ohms, 1.0 / self._sensor.angular_ohms
-        if radial > 0.0:
-            upper, lower = FrameInversion(self._sensor).untouched(radial, angular)
-        observation = _observe(self._sensor, frame, 1.5, radial > 0.0)
-        return _Fit(self._hypotheses[len(self._found)], observation, upper, lower)
+        observation = _observe(self._sensor, frame, 1.5, self._currents.means[1] > 0.0)
+        return _Fit(self._hypotheses[len(self._found)], observation, *self._currents.sheets())
 
     def _decide(self, given: Fault) -> Fault:
         """Return the name of the likeliest hypothesis, where those of other names are far from it."""

@@ -47,7 +47,7 @@ class TouchStream:
         self._by_number = {d.sensor.device_id << 8 | d.sensor.sensor_id: d for d in self.detectors}
         names = {d.sensor.name for d in self.detectors}
         if len(self._by_number) < len(self.detectors) or len(names) < len(self.detectors):
-            listing = ", ".join(f"{s.name} = {s.device_id}/{s.sensor_id}" for s in sensors)
+            listing = ", ".join(f"{s.name} = {s.number}" for s in sensors)
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
         self._bad = self._skipped = 0
@@ -58,11 +58,6 @@ class TouchStream:
     def ready(self) -> bool:
         """True while every sensor is ready: silence then means "no touch"."""
         return all(detector.ready for detector in self.detectors)
-
-    @property
-    def touched(self) -> bool:
-        """True while any sensor is touched."""
-        return any(detector.touched for detector in self.detectors)
 
     def feed(self, data: bytes, now: float, alarm: TouchAlarm | None = None, held_up: float = 0.0) -> list[SkinEvent]:
         """Take the next bytes.
@@ -103,7 +98,7 @@ class TouchStream:
         """Report a fault, once, for each sensor that has sent no valid frame for longer than allowed [s]."""
         events: list[SkinEvent] = []
         for detector in self.detectors:
-            if detector.age(now) > longest:
+            if detector.timing.age(now) > longest:
                 events += detector.silence(now, longest)
         return events
 

@@ -239,7 +239,7 @@ _IDEAL_FLAWS = SheetFlaws(), SheetFlaws()
 
 
 def build_specimen(
-    sensors: Sequence[Sensor], tolerance: SheetTolerance, seed: int, model: str
+    sensors: Sequence[Sensor], tolerance: SheetTolerance, seed: int, model: str, peeled: float
 ) -> tuple[list[Sensor], ContactModel]:
     """Return sensors as they are built, with leads of their own, and the contact model of their sheets.
 
@@ -248,6 +248,7 @@ def build_specimen(
         tolerance: what their leads and sheets are drawn from.
         seed: of that; the sheets of all are alike.
         model: of the ideal sheets, "field" or "ladder".
+        peeled: part of electrode B that is not bonded.
     """
     rng = random.Random(f"leads {seed}")
     built = []
@@ -255,4 +256,5 @@ def build_specimen(
         parts = sensor.electronics
         leads = LeadOhms(*(ohms + abs(rng.gauss(0.0, tolerance.lead)) for ohms in parts.lead_ohms))
         built.append(replace(sensor, electronics=replace(parts, lead_ohms=leads)))
-    return built, BuiltSheets(draw_flaws(tolerance, seed), contact_model(model))
+    upper, lower = draw_flaws(tolerance, seed)
+    return built, BuiltSheets((replace(upper, peeled=peeled), lower), contact_model(model))

@@ -61,7 +61,7 @@ _MAX_SCRIPT = 1 << 20  # bytes of a script
 _FAULT_KINDS = {f.name: type(f.default) for f in fields(FaultInjection)}  # int where it may be None
 # of the electronics, and of time
 _ELECTRIC_FLAWS = frozenset({"current_gain", "current_offset", "offset_counts", "mains_volts", "warming"})
-_FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", *sorted(_ELECTRIC_FLAWS))
+_FLAW_NAMES = ("slope", "patches", "skew", "lead", "line", "peeled", *sorted(_ELECTRIC_FLAWS))
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -104,7 +104,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--specimen", choices=tuple(SHEET_CLASSES), default="ideal", help=help_text)
     help_text = (
         f"set one flaw of the specimen; may be repeated. Names: {', '.join(_FLAW_NAMES)}. Of sheets, leads and "
-        "lines it is a standard deviation; warming is the growth of the upper sheet's resistance [1/s]"
+        "lines it is a standard deviation; peeled is the part of electrode B that is not bonded, warming the growth "
+        "of the upper sheet's resistance [1/s]"
     )
     add("--flaw", type=_argument(_parse_flaw), metavar="NAME=VALUE", help=help_text, **many)
     add("--noise-counts", type=float, default=0.7, help="standard deviation of each reading [counts] (default 0.7)")
@@ -130,13 +131,13 @@ def run(args: argparse.Namespace) -> int:
         raise SensorError(f"--sensors must be at least 1, got {args.sensors}")
     sensors = [Sensor(frustum, args.sensor + number, device_id=args.device) for number in range(args.sensors)]
     flaws = dict(args.flaw)
-    own = {name: flaws[name] for name in _ELECTRIC_FLAWS & flaws.keys()}
+    own, peeled = {name: flaws[name] for name in _ELECTRIC_FLAWS & flaws.keys()}, flaws.pop("peeled", 0.0)
     tolerance = replace(SHEET_CLASSES[args.specimen], **{k: v for k, v in flaws.items() if k not in own})
     model: ContactModel | str = args.model
-    if tolerance != IDEAL_SHEETS:
+    if tolerance != IDEAL_SHEETS or peeled:
         from .built_sheets import build_specimen
 
-        sensors, model = build_specimen(sensors, tolerance, args.seed, args.model)
+        sensors, model = build_specimen(sensors, tolerance, args.seed, args.model, peeled)
     names = {str(sensor.sensor_id): sensor.name for sensor in sensors}
     presses: list[tuple[str, ScriptedTouch]] = [*args.touch, *(_read_script(args.script) if args.script else ())]
     touches = []

@@ -32,6 +32,7 @@ PLAIN = forearm_scene(reaction='kind = "retreat"').replace(
     "[[link.sensor]]", '[[link.sensor]]\nname = "skin"\ndevice = 7'
 )
 NAMED = PLAIN.replace("device = 7", 'device = 7\ncalibration = "calibrations"')
+OHMS = {"7/0": (990.0, 1010.0)}
 ALONG, AROUND = (0.001, 0.0123456789012345, 0.0, 0.0, 0.0, 0.0), (0.0, -0.02, 0.0, 0.01, 0.0, 0.0)
 
 
@@ -61,7 +62,7 @@ def test_a_scene_takes_the_newest_calibration_of_its_device(tmp_path: Path) -> N
     scene = load_scene(saved(tmp_path))
     found = scene.sensors[0].sensor.place_map
     assert found is not None
-    assert (found.along, found.around, found.sheet_ohms) == (ALONG, AROUND, (990.0, 1010.0))
+    assert (found.along, found.around, scene.sensors[0].sensor.known_ohms) == (ALONG, AROUND, OHMS["7/0"])
     assert summarize(scene)["calibration of skin"].startswith(
         "device-7.json of 2026-11-22, 9 touches, 1.50 mm became 0.31"
     )
@@ -174,7 +175,7 @@ def test_a_new_calibration_makes_a_commissioning_void(tmp_path: Path) -> None:
     scene = load_scene(saved(tmp_path))
     marks = tuple(MarkResult("skin", "here", u, 2.0, u, 2.0, 0.0, 0.5, 1, True) for u in (1.0, 2.0, 3.0, 4.0, 5.0))
     write_record(
-        scene, CommissioningRecord("2026-11-22T10:00:00+00:00", "0.1.0", fingerprint(scene), True, "", "", marks)
+        scene, CommissioningRecord("2026-11-22T10:00:00+00:00", "0.1.0", fingerprint(scene), True, "", "", marks, OHMS)
     )
     known = with_commissioning(load_scene(saved(tmp_path)), 1795341600.0).commissioning
     assert known is not None

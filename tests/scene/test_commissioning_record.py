@@ -10,7 +10,7 @@ import pytest
 
 from coneskin.core.errors import SceneError
 from coneskin.robot.guard.signals.journal import GuardEvent
-from coneskin.scene.build import build_core
+from coneskin.scene.build import build_core, known_sensors
 from coneskin.scene.commissioning_record import (
     _read_record,
     _record_path,
@@ -28,6 +28,7 @@ from tests.support.sweep import sweep
 from .scenes import SERIAL_RETREAT, SKIN_ONLY, inputs
 
 DAY = 86400.0
+OHMS = {"0/1": (1000.0, 1000.0)}
 VIRTUAL_RETREAT = SERIAL_RETREAT.replace('kind = "serial"', 'kind = "virtual"').replace(
     'port = "hwgrep://0403:6001"    # or /dev/ttyUSB0, COM3, socket://host:port\n', ""
 )
@@ -50,7 +51,7 @@ def test_a_record_that_passed_is_valid(tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
     path = write_passed_record(scene)
     assert path == tmp_path / "scene.commissioning.json"
-    assert known(scene) == Commissioning(True, f"passed on {datetime.now(UTC):%Y-%m-%d} by a test, 5 marks")
+    assert known(scene) == Commissioning(True, f"passed on {datetime.now(UTC):%Y-%m-%d} by a test, 5 marks", OHMS)
     assert known(scene, 3650.0).valid, "without max_age_days it stays valid"
     assert [item.name for item in tmp_path.iterdir() if "part" in item.name] == []
 
@@ -66,6 +67,9 @@ def test_a_record_that_passed_is_valid(tmp_path: Path) -> None:
         ({"read_phi_deg": -30.0}, "was read 0 mm and 30 deg off"),
         ({"read_u_mm": float("nan")}, "was read nan mm"),
         ({"level": 0.0}, "has the level 0, at which nothing touches"),
+        ({"sheet_ohm": {}}, "it has no `sheet_ohm`"),
+        ({"sheet_ohm": {"0/1": [1000.0, 0.0]}}, "it has no `sheet_ohm`"),
+        ({"sheet_ohm": {"0/1": [float("nan"), 1.0]}}, "by which a peeled electrode would show"),
     ],
 )
 def test_a_record_that_says_it_has_passed_and_is_not_complete_is_of_no_use(tmp_path: Path, change, said) -> None:
@@ -73,9 +77,10 @@ def test_a_record_that_says_it_has_passed_and_is_not_complete_is_of_no_use(tmp_p
     scene = scene_in(tmp_path)
     table = json.loads(write_passed_record(scene).read_text())
     table["marks"] = table["marks"][: change.get("marks", 5)]
+    table["sheet_ohm"] = change.get("sheet_ohm", table["sheet_ohm"])
     for number, mark in enumerate(table["marks"]):
         if "u_mm" in change or not number:
-            mark.update({name: value for name, value in change.items() if name != "marks"})
+            mark.update({name: value for name, value in change.items() if name not in ("marks", "sheet_ohm")})
     if "sensor" in change:
         table["marks"].append({**table["marks"][1]})
     _record_path(scene).write_text(json.dumps(table))
@@ -133,6 +138,8 @@ def test_what_the_places_do_not_depend_on_keeps_it_valid(old: str, new: str, tmp
     write_passed_record(scene_in(tmp_path))
     text = SERIAL_RETREAT.replace(old, new)
     assert text != SERIAL_RETREAT
+    (sensor,) = known_sensors(with_commissioning(scene_in(tmp_path, text), 0.0))
+    assert sensor.known_ohms == (1000.0, 1000.0)
     assert known(scene_in(tmp_path, text)).valid
 
 
@@ -182,7 +189,7 @@ def test_nonsense_is_void_and_no_traceback(text: str, tmp_path: Path) -> None:
     assert "is of no use" in known(scene).note
 
 
-@pytest.mark.parametrize("key", ["passed", "date", "fingerprint", "marks"])
+@pytest.mark.parametrize("key", ["passed", "date", "fingerprint", "marks", "sheet_ohm"])
 @pytest.mark.parametrize("value", [None, "no", 1, [1], {"a": 1}])
 def test_a_wrong_value_is_void(key: str, value: object, tmp_path: Path) -> None:
     scene = scene_in(tmp_path)
@@ -244,6 +251,22 @@ def test_without_a_record_the_arm_only_stops_and_says_so(text: str, tmp_path: Pa
     names = [event.name for event in told["bare"]]
     assert names[:2] == ["activated", "not_commissioned"]
     assert "there is no commissioning record" in told["bare"][1].details["what"]
+    assert "latched" in names
+    assert "retreating" not in names
+
+
+@pytest.mark.promise("P12")
+def test_an_electrode_that_peeled_off_before_the_start_lets_nothing_retreat(tmp_path: Path) -> None:
+    """The untouched sheets are not those of the commissioning; every activation says so, and a touch stops the arm."""
+    scene = scene_in(tmp_path, VIRTUAL_RETREAT)
+    peeled = replace(scene, commissioning=Commissioning(True, "by a test", {"0/1": (950.0, 1000.0)}))
+    core, outputs = build_core(peeled), []
+    for block in inputs(peeled, ScriptedTouch(0.8, 1.0, 0.2, 2.5, sensor="upper arm skin"), 1.3):
+        core.feed(block, outputs)
+    told = [output for output in outputs if isinstance(output, GuardEvent)]
+    names = [event.name for event in told]
+    assert names[:2] == ["activated", "message"]
+    assert "no place on upper arm skin is certain: the upper sheet, or its bond to A or B" in told[1].details["what"]
     assert "latched" in names
     assert "retreating" not in names
 

@@ -72,4 +72,5 @@ def write_passed_record(scene: Scene) -> Path:
         for u in map(float, range(MIN_MARKS))
     )
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    return write_record(scene, CommissioningRecord(now, "", fingerprint(scene), True, "", "a test", marks))
+    ohms = {item.sensor.number: (item.sensor.upper_sheet_ohms, item.sensor.lower_sheet_ohms) for item in scene.sensors}
+    return write_record(scene, CommissioningRecord(now, "", fingerprint(scene), True, "", "a test", marks, ohms))

@@ -34,7 +34,12 @@ _PRIOR_NOISE: Final = 0.7  # counts; standard deviation that is assumed at the s
 _ROUNDING_VARIANCE: Final = 1.0 / 12.0  # counts^2; variance of rounding alone
 _CURRENT_JUMP: Final = 0.01  # ratio; an untouched current that is off by this has changed
 _JUMP_DEVIATIONS: Final = 8.0
-_ALIKE_SHARE: Final = 0.5  # of the larger change; by less they differ where one thing has changed both
+_ALIKE_SHARE: Final = 0.5  # of the larger change; with more than this the other one has the same cause
+# ratio, by which a sheet may change over the other one, and both, by warmth and damp. PEDOT:PSS, the worst, has .77 % a
+# kelvin (Wang et al. 2020); two layers on each other differ by 1 K or so, a room and an arm by 30 K
+_ONE_DRIFT: Final = 0.015
+_ZERO_ERROR: Final = 2.0  # counts, by which the zeros of two days may differ unseen
+_BOTH_DRIFT: Final = 0.25
 _ZERO_CHANGE: Final = 0.4  # counts, of the mean of a block; less is noise of where no current flows
 _ZERO_DEVIATIONS: Final = 4.0
 _THRESHOLD_DEVIATIONS: Final = 7.0  # standard deviations from what noise reaches to a threshold: once in 1e11 frames
@@ -61,6 +66,7 @@ class UntouchedCurrents:
         self.aspect = sensor.radial_ohms / sensor.upper_sheet_ohms
         self._weight = self.aspect * self.aspect
         self._drift = drift
+        self._sensor, self._inversion, self._known = sensor, FrameInversion(sensor), sensor.known_ohms
         parts = sensor.electronics
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
         variance = (_PRIOR_NOISE * _PRIOR_NOISE + _ROUNDING_VARIANCE) * (1.0 + self._weight**2) / supply**2
@@ -68,11 +74,19 @@ class UntouchedCurrents:
         limits, bounds = sensor.thresholds, sensor.bounds
         current = min(bounds.radial_low, bounds.angular_low) * (1.0 / limits.current_low - 1.0)
         guide = min(_MAX_GUIDE_THRESHOLD, math.sqrt(2.0) * (limits.touch_level - limits.release_level)) * supply
+        self._one_drift = _ONE_DRIFT + _ZERO_ERROR * limits.current_low / min(bounds.radial_low, bounds.angular_low)
         self._per_guide = bounds.touch_current_per_guide
         self._noisiest = min(guide, current) / _THRESHOLD_DEVIATIONS  # counts
         self.spread, self.means = (variance, 0.0), (0, 0.0, 0.0)
         self._newest = 0.0, 0.0  # mixed means, and zero, of the newest block
         self.skip()
+
+    def sheets(self) -> tuple[float, float]:
+        """Return the conductances of the upper and the lower sheet [S]; the design's until they have been seen."""
+        _, radial, angular = self.means
+        if not radial:
+            return 1.0 / self._sensor.radial_ohms, 1.0 / self._sensor.angular_ohms
+        return self._inversion.untouched(radial, angular)
 
     def restart(self) -> None:
         """Learn the currents anew. The noise stays known."""
@@ -116,14 +130,11 @@ class UntouchedCurrents:
             last += (1.0 - self._weight) * crept
         limit = _JUMP_DEVIATIONS * math.sqrt(self.spread[0] / CURRENT_BLOCK)
         step1, step2 = mean1 - radial, mean2 - angular
-        upper = abs(step1) > max(_CURRENT_JUMP * radial, limit)
-        lower = abs(step2) > max(_CURRENT_JUMP * angular, limit)
-        if upper or lower:
+        upper, lower = max(_CURRENT_JUMP * radial, limit), max(_CURRENT_JUMP * angular, limit)
+        if abs(step1) > upper or abs(step2) > lower:
             self.means, self._newest = (frames, radial, angular), (last, known)
             part1, part2 = step1 / radial, step2 / angular
-            where = "the gain of the current, or both sheets"
-            if upper != lower and abs(part1 - part2) > _ALIKE_SHARE * max(abs(part1), abs(part2)):
-                where = f"the {'upper' if upper else 'lower'} sheet, or its bond to {'A or B' if upper else 'C or D'}"
+            where = _changed_sheet(part1, part2)
             return Fault.CURRENT_CHANGED, f"{where}: radial {100.0 * part1:+.2f} %, angular {100.0 * part2:+.2f} %"
         self._learn_noise(mixed - last, supply, blocks)
         self._newest = mixed, known
@@ -134,6 +145,11 @@ class UntouchedCurrents:
         self.means = blocks * CURRENT_BLOCK, radial, angular
         if self.noise > self._noisiest:
             return Fault.NOISE, f"{self.noise:.1f} counts, at most {self._noisiest:.1f}"
+        if self._known:
+            where, by = compare_sheets(self._known, self._sensor.sheet_ohms(*self.sheets()), self._one_drift)
+            if where:
+                self._known = ()  # it is told once
+                return Fault.CURRENT_CHANGED, f"{where}; {by}: mend it, or calibrate and commission again"
         return None
 
     def _learn_noise(self, change: float, supply: int, blocks: int) -> None:
@@ -145,6 +161,35 @@ class UntouchedCurrents:
         noise = max(0.0, variance / scale - _ROUNDING_VARIANCE)
         # The mean of a rounded value whose noise is Gaussian is off by at most this [counts]; here of two means.
         self.spread = variance, 2.0 / math.pi * math.exp(-2.0 * math.pi * math.pi * noise) * math.sqrt(scale)
+
+
+def _changed_sheet(upper: float, lower: float) -> str:
+    """Return what has changed, by the changes of both sheets' currents or resistances, ratios of any sign."""
+    upper, lower = abs(upper), abs(lower)
+    if min(upper, lower) > _ALIKE_SHARE * max(upper, lower):
+        return "the gain of the current, or both sheets"
+    name, electrodes = ("upper", "A or B") if upper > lower else ("lower", "C or D")
+    return f"the {name} sheet, or its bond to {electrodes}"
+
+
+def compare_sheets(
+    known: tuple[float, ...], ohms: tuple[float, float], one: float, both: float = _BOTH_DRIFT
+) -> tuple[str, str]:
+    """Compare a sensor's sheets with what they were known to be.
+
+    Args:
+        known: then, upper and lower [ohm per square].
+        ohms: now.
+        one: by which one may have changed over the other, a ratio.
+        both: by which both may.
+
+    Returns:
+        what has changed by more, or nothing, and the changes in words.
+    """
+    upper, lower = ohms[0] / known[0] - 1.0, ohms[1] / known[1] - 1.0
+    words = f"ohm per square against those on record: upper {100.0 * upper:+.1f} %, lower {100.0 * lower:+.1f} %"
+    good = abs(upper - lower) <= one and max(abs(upper), abs(lower)) <= both
+    return "" if good else _changed_sheet(upper, lower), words
 
 
 def bounded(step: float, most: float) -> float:

@@ -17,15 +17,15 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents
 from coneskin.skin.sensor import Sensor
 
 WEAK = "it presses too lightly for a place"  #: below the level from which places are told
 CONTRADICTS = "the guides of a phase differ too much for one contact"  #: the frame itself
-#: a sheet or a bond is another since the guard began, and so is the place that a reading means
-ALTERED = "a drive current has changed since the guard began: look at the sheet, and run coneskin doctor"
+#: a sheet or a bond is another, and so is the place that a reading means
+ALTERED = "a drive current is not what it was: look at the sheet and its electrodes, and run coneskin doctor"
 MOVES = "it has only begun, or moves"  #: the place is not that of the frame before
 
 
@@ -61,7 +61,7 @@ class SingleContactTest:
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings, currents: UntouchedCurrents) -> None:
         parts, cone = sensor.electronics, sensor.frustum
-        self._currents, self._inversion = currents, FrameInversion(sensor)
+        self._currents = currents
         aspect = currents.aspect
         self._wrap = cone.wrap
         self._angles = (cone.wrap / DANGEROUS_ANGLE) ** 2
@@ -73,16 +73,13 @@ class SingleContactTest:
         self._per_along, self._per_cross = self._angles * aspect**2, 2.0 * self._angles * aspect
         self._largest = settings.largest_contact
         self._scale = self._unit * max(1.0, _split_noise(sensor, aspect))
-        self._sheets = 0.0, 0.0
         self.begin()
 
     def begin(self) -> None:
         """Forget the evidence: another touch, or another place."""
         self._evidence = 0, 0.0, 0.0, 0.0, 0.0, 0.0  # frames; means of the inequality, across, rise, required, disc
         self._certain = False
-        frames, radial, angular = self._currents.means
-        if frames:
-            self._sheets = self._inversion.untouched(radial, angular)
+        self._sheets = self._currents.sheets()
 
     def largest_disc(self, u: float) -> float:
         """Return the radius up to which one contact at u [m] is taken for one [m]."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameInversion, FrameNoise, MatrixNoise
+from coneskin.skin.detection.frame.contact_matrix import ContactMatrix, FrameNoise, MatrixNoise
 from coneskin.skin.detection.frame.reading import Reading, TouchReading
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak
@@ -47,7 +47,7 @@ class TouchPlace:
         guides: of the untouched sensor, with what mains do to them.
 
     Attributes:
-        altered: a drive current has changed since the guard began. No place is certain from then on.
+        altered: how a drive current is not what it was; empty while it is. No place is certain from then on.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class TouchPlace:
         guides: UntouchedGuides,
     ) -> None:
         cone, parts = sensor.frustum, sensor.electronics
-        self._inversion, self._of_frame = FrameInversion(sensor), FrameNoise(sensor)
+        self._of_frame = FrameNoise(sensor)
         self._estimator = PlaceEstimator(sensor)
         self._single = SingleContactTest(sensor, settings, currents)
         self._currents, self._drift = currents, settings.current_drift
@@ -79,7 +79,7 @@ class TouchPlace:
         self._noise: MatrixNoise | None = None
         # frames for which the estimate serves, in all when it is made anew, conductance of which it was made [S]
         self._due: tuple[int, float, float] = 0, 1.0, 0.0
-        self.altered = False
+        self.altered = ""
         self._located = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
@@ -208,10 +208,9 @@ class TouchPlace:
     def _sheets(self, now: float) -> SheetConductances:
         """Return the sheets as they were learned. While a touch lasts they may drift unseen."""
         (frames, radial, angular), (variance, bias) = self._currents.means, self._currents.spread
+        upper, lower = self._currents.sheets()
         if not frames:
-            upper, lower = self._estimator.sheets
             return SheetConductances(upper, lower, (_UNLEARNED_ERROR * upper) ** 2, (_UNLEARNED_ERROR * lower) ** 2)
-        upper, lower = self._inversion.untouched(radial, angular)
         one = variance / (1.0 + self._currents.aspect**4) / frames + bias**2
         ratio = one / radial**2, one / angular**2
         drift = (self._drift * (now - self._began)) ** 2 + self._sheet_drift

@@ -17,6 +17,7 @@ import argparse
 import json
 import math
 import tomllib
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,12 +30,6 @@ if TYPE_CHECKING:
 
 _DEFAULT_FOLDER = "calibrations"
 _UNEVEN_MM = 2.0  # rms of what a map leaves of a touch; of a film of its class it is 0.7, and 1.2 with four marks
-#: of a calibration, in the JSON object of its result
-_SHOWN_FIELDS = (
-    *("before_rms_mm", "after_rms_mm", "before_largest_mm", "after_largest_mm", "map_error_mm"),
-    *("map_along", "map_around", "fitted_along", "fitted_around", "extra_ohm", "sheet_ohm"),
-    *("forces_n", "force_levels", "force_error"),
-)
 _ERROR_HELP = "standard deviation with which marks are placed and touched, along and around (default: 0.3)"
 _FORCES_HELP = "then press three of the marks with these known forces [N], e.g. 1,2,5,10, for touch_force_n"
 _MARKS_HELP = "marks on each sensor, to be measured (default: those that its design has printed on the cover, else 9)"
@@ -121,22 +116,19 @@ def _write(results: list[CalibrationResult], named: list[Path | None], default: 
 
 def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: bool) -> None:
     record, name = result.record, result.touches.sensor.name
-    if as_json:
-        line = {"kind": "end", "sensor": name, "calibrated": record is not None, "cause": result.refusal}
-        if record is not None:
-            line |= {"file": str(path), **{field: getattr(record, field) for field in _SHOWN_FIELDS}}
-            line |= {"touches": len(record.touches), "used": sum(touch.used for touch in record.touches)}
-        print(json.dumps(line), flush=True)
-        return
+    line = {"kind": "end", "sensor": name, "calibrated": record is not None, "cause": result.refusal}
     if record is None:
-        print(f"NOT calibrated: {result.refusal}")
+        print(json.dumps(line) if as_json else f"NOT calibrated: {result.refusal}", flush=True)
         return
-    used = sum(touch.used for touch in record.touches)
+    used, uneven = sum(touch.used for touch in record.touches), record.after_rms_mm > _UNEVEN_MM
+    if as_json:
+        line |= {"file": str(path), "touches": len(record.touches), "used": used, "uneven": uneven}
+        print(json.dumps({**asdict(record), **line}), flush=True)
+        return
     leads = ", ".join(f"{letter} {ohm:+.1f}" for letter, ohm in zip("ABCD", record.extra_ohm, strict=True))
     leads += " ohm more than lead_ohm, if it is leads"
-    if any(
-        ohm + own < 0.0 for ohm, own in zip(record.extra_ohm, result.touches.sensor.electronics.lead_ohms, strict=True)
-    ):
+    own = result.touches.sensor.electronics.lead_ohms
+    if any(more + ohm < 0.0 for more, ohm in zip(record.extra_ohm, own, strict=True)):
         leads = "it is not leads alone: one would have less than 0 ohm"
     print(f"{name}: {len(record.touches)} touches, {used} used")
     print(f"  before      {record.before_rms_mm:.2f} mm (rms), {record.before_largest_mm:.2f} mm at most")
@@ -144,10 +136,8 @@ def _show(result: CalibrationResult, path: Path | None, unnamed: bool, as_json: 
         f"  calibrated  {record.after_rms_mm:.2f} mm (rms), {record.after_largest_mm:.2f} mm at most, cross-validated; "
         "it holds how well the marks were placed and touched"
     )
-    if record.after_rms_mm > _UNEVEN_MM:
-        print(
-            f"  uneven      {_UNEVEN_MM:g} mm is much: the sheet is not uniform, or marks were missed. Take --marks 16,"
-        )
+    if uneven:
+        print(f"  uneven      {_UNEVEN_MM:g} mm is much: the sheet is not even, or marks were missed. Take --marks 16,")
         print('              write sheet_class = "coated", or build with another sheet, and calibrate again')
     print(
         f"  fitted      along: {record.fitted_along}; around: {record.fitted_around}; {record.map_error_mm:.2f} mm "

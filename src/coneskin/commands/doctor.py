@@ -55,9 +55,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Examine a scene."""
+    from coneskin.scene.commissioning_record import with_commissioning
     from coneskin.scene.reader import load_scene
 
-    scene = load_scene(args.scene)
+    scene = with_commissioning(load_scene(args.scene), time.time())
     measured: list[Finding] = []
 
     def tell(finding: Finding) -> None:
@@ -94,11 +95,9 @@ def run(args: argparse.Namespace) -> int:
 def _check(scene: Scene, as_json: bool) -> int:
     """List what is in a scene; return 1 where a guard would refuse it."""
     from coneskin.scene.build import place_on_arm
-    from coneskin.scene.commissioning_record import with_commissioning
     from coneskin.scene.summary import missing_parts, summarize
     from coneskin.scene.suspicions import suspicions
 
-    scene = with_commissioning(scene, time.time())
     if any(link.mesh for link in scene.links):
         place_on_arm(scene)  # reads them, as a guard would
     found, missing, doubts = summarize(scene), missing_parts(scene), [one.line for one in suspicions(scene)]

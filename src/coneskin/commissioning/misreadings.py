@@ -76,11 +76,8 @@ def misread(sensor: Sensor, wrong: _Misreading, place: Place) -> Place:
     radial, angular = sensor.fractions(*place)
     if wrong.exchanged:
         radial, angular = angular, radial
-    return Place(
-        *sensor.place(
-            1.0 - radial if wrong.mirror_radial else radial, 1.0 - angular if wrong.mirror_angular else angular
-        )
-    )
+    radial = 1.0 - radial if wrong.mirror_radial else radial
+    return Place(*sensor.place(radial, 1.0 - angular if wrong.mirror_angular else angular))
 
 
 def miss(sensor: Sensor, mark: Place, read: Place) -> tuple[float, float]:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.session.skin_client import SkinClient
     from coneskin.skin.detection.frame.reading import TouchReading
-    from coneskin.skin.sensor import Sensor
     from coneskin.skin.sources.source import Source
 
 _FRAME_TIMEOUT = 30.0  # s that frames may be late or missing: nothing is guarded, and a late place is as good
@@ -68,13 +67,12 @@ class SkinWatch:
                 raise SkinError(f"{', '.join(late)}: no run of good untouched frames in {_READY_TIMEOUT:g} s: {why}")
         self._faults.clear()
 
-    def untouched_ohms(self, sensor: Sensor) -> tuple[float, float]:
-        """Return what the untouched sheets of a sensor have per square [ohm], upper and lower, as its currents say.
+    def untouched_ohms(self) -> dict[str, tuple[float, float]]:
+        """Return what the untouched sheets of each sensor have per square [ohm], upper and lower, as its currents say.
 
         The leads are taken to be those of the scene.
         """
-        (found,) = (detector for detector in self._stream.detectors if detector.sensor.name == sensor.name)
-        return sensor.sheet_ohms(*found.untouched_sheets)
+        return {detector.sensor.number: detector.untouched_ohms for detector in self._stream.detectors}
 
     def contradiction(self, sensor: str) -> str:
         """Return why a sensor's places must not be believed although they look right; empty where they may be.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from coneskin.robot.guard.core import GuardCore
     from coneskin.robot.guard.speed.speed_limit import SpeedLimit
     from coneskin.skin.detection.stream import TouchStream
+    from coneskin.skin.sensor import Sensor
 
     from .values.scene import Scene, SpeedLimitScene
 
@@ -71,7 +72,14 @@ def build_stream(scene: Scene, detector: Mapping[str, Any] | None = None) -> Tou
     limits = scene.monitoring_limits
     timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)
     settings = DetectorSettings(stuck_frames=limits.stuck_frames, timing=timing, **(detector or {}))
-    return TouchStream([item.sensor for item in scene.sensors], settings)
+    return TouchStream(known_sensors(scene), settings)
+
+
+def known_sensors(scene: Scene) -> list[Sensor]:
+    """Return a scene's sensors with what their untouched sheets were when they were commissioned."""
+    known = scene.commissioning.sheet_ohm if scene.commissioning else {}
+    own = [item.sensor for item in scene.sensors]
+    return [replace(one, known_ohms=known.get(one.number, one.known_ohms)) for one in own]
 
 
 def withheld_motion(scene: Scene) -> str:

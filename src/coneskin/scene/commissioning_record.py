@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,9 +26,7 @@ MIN_MARKS = 5  #: marks on each sensor
 MAX_MISS = (0.020, math.radians(25.0))  #: m along the link, and rad about it, by which a mark may be misread at most
 _CHAIN_NUMBER = 1  # to be raised where the way from a frame to a place on the arm changes, so that old records are void
 _MAX_BYTES = 1 << 20  # of a record
-_DAY_SECONDS = 86400.0  # s
-_CLOCK_ERROR = _DAY_SECONDS  # s that a record may be ahead of this computer's date
-_HOW_TO = "see `coneskin commission`"
+_DAY_SECONDS = 86400.0  # s; by one, a record may be ahead of this computer's date
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +70,7 @@ class CommissioningRecord:
         cause: why it did not pass, for people.
         by: who touched it; empty where nobody said so.
         marks: in the order in which they were touched.
+        sheet_ohm: what the untouched sheets of each sensor, by its number, had per square, upper and lower [ohm].
     """
 
     date: str
@@ -81,6 +80,7 @@ class CommissioningRecord:
     cause: str
     by: str
     marks: tuple[MarkResult, ...]
+    sheet_ohm: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def fingerprint(scene: Scene) -> str:
@@ -138,7 +138,8 @@ def _read_record(path: Path) -> CommissioningRecord:
     """Read a record. Whatever is not one raises an OSError, ValueError, TypeError, AttributeError or KeyError."""
     table = read_json(read_file(path, _MAX_BYTES))
     marks = tuple(MarkResult(**mark) for mark in table.pop("marks"))
-    record = CommissioningRecord(**table, marks=marks)
+    ohms = {str(name): (float(upper), float(lower)) for name, (upper, lower) in table.pop("sheet_ohm", {}).items()}
+    record = CommissioningRecord(**table, marks=marks, sheet_ohm=ohms)
     datetime.fromisoformat(record.date)
     return record
 
@@ -170,8 +171,9 @@ def _check(scene: Scene, now: float) -> Commissioning:
         then = then if then.tzinfo else then.replace(tzinfo=UTC)
         if not (why := _objection(scene, record, f"{then:%Y-%m-%d}", now - then.timestamp())):
             by = f" by {record.by}" if record.by else ""
-            return Commissioning(True, f"passed on {then:%Y-%m-%d}{by}, {len(record.marks)} marks")
-    return Commissioning(False, f"{why}: {_HOW_TO}")
+            note = f"passed on {then:%Y-%m-%d}{by}, {len(record.marks)} marks"
+            return Commissioning(True, note, record.sheet_ohm)
+    return Commissioning(False, f"{why}: see `coneskin commission`")
 
 
 def _objection(scene: Scene, record: CommissioningRecord, day: str, age: float) -> str:
@@ -189,7 +191,7 @@ def _objection(scene: Scene, record: CommissioningRecord, day: str, age: float) 
     if limit is not None and age > limit:
         allowed = f"{limit / _DAY_SECONDS:g} days are allowed (commissioning.max_age_days)"
         return f"{it} is {age / _DAY_SECONDS:.1f} days old, {allowed}"
-    if limit is not None and age < -_CLOCK_ERROR:
+    if limit is not None and age < -_DAY_SECONDS:
         return f"the commissioning is dated {day}, which is still to come; set the date"
     return ""
 
@@ -199,6 +201,9 @@ def _flaw(scene: Scene, record: CommissioningRecord) -> str:
     touched = list(dict.fromkeys(mark.sensor for mark in record.marks))
     if len(touched) != len(scene.sensors):
         return f"it has marks on {len(touched)} sensors, and the scene has {len(scene.sensors)}"
+    known = [ohms for item in scene.sensors for ohms in record.sheet_ohm.get(item.sensor.number, (0.0, 0.0))]
+    if not all(0.0 < ohms < math.inf for ohms in known):
+        return "it has no `sheet_ohm` of each sensor, by which a peeled electrode would show"
     for name in touched:
         marks = [mark for mark in record.marks if mark.sensor == name]
         places = {(mark.u_mm, mark.phi_deg) for mark in marks}

@@ -115,7 +115,7 @@ def _sensor(item: PlacedSensor, link: str, frame: str) -> str:
     place = ", ".join(f"{1e3 * x:g}" for x in pose.translation)
     turn = ", ".join(f"{math.degrees(x):g}" for x in pose.rpy)
     return (
-        f"id {sensor.device_id}/{sensor.sensor_id} on the {link}: radius {1e3 * cone.radius1:g} to "
+        f"id {sensor.number} on the {link}: radius {1e3 * cone.radius1:g} to "
         f"{1e3 * cone.radius2:g} mm, height {1e3 * cone.height:g} mm, wrap {math.degrees(cone.wrap):g} deg, "
         f"at ({place}) mm, rpy ({turn}) deg, in the {frame} frame"
     )

@@ -38,6 +38,8 @@ def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Out
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [line["kind"] for line in lines if line["kind"] != "reading"] == ["mark", "passed"] * 5 + ["sensor", "end"]
     assert lines[-1]["passed"] is True
+    record = json.loads((tmp_path / "scene.commissioning.json").read_text())
+    assert record["sheet_ohm"] == {"0/0": pytest.approx([1000.0, 1000.0], rel=3e-3)}
     assert "wrist 3" in lines[-1]["no_skin_on"]
     assert main(["doctor", str(path), "--check", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["commissioning"].endswith("by a test, 5 marks")
@@ -66,6 +68,7 @@ def test_a_program_commissions_its_virtual_skin() -> None:
     known = commission_virtual_skin(parse_scene(TEXT)).commissioning
     assert known is not None
     assert known.valid
+    assert known.sheet_ohm == {"0/0": pytest.approx((1000.0, 1000.0), rel=3e-3)}
     assert "5 marks touched by this program" in known.note
 
 

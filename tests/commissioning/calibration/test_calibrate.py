@@ -117,7 +117,11 @@ def test_an_uneven_sheet_is_said_with_what_to_do_and_has_no_lead_below_nothing(
     numbers = {"map_along": (), "map_around": (), "fitted_along": "", "fitted_around": "", "map_error_mm": 1.0}
     ohms = {"extra_ohm": (1.3, 11.1, 11.7, lead), "sheet_ohm": (996.0, 996.0), "touches": ()}
     record = CalibrationRecord(**words, **errors, **numbers, **ohms)  # type: ignore[arg-type]
-    _show(CalibrationResult(SensorTouches(sensor, ()), None, record), None, False, False)
+    result = CalibrationResult(SensorTouches(sensor, ()), None, record)
+    _show(result, None, False, True)
+    end = json.loads(capsys.readouterr().out)
+    assert (end["uneven"], end["sensor"], end["touches"]) == (uneven, sensor.name, 0)
+    _show(result, None, False, False)
     said = capsys.readouterr().out
     assert ("--marks 16" in said and "sheet_class" in said) is uneven
     assert (f"D {lead:+.1f} ohm more than lead_ohm" in said) is leads

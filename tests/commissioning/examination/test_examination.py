@@ -85,7 +85,8 @@ def right() -> Doctor:
 
 def test_a_right_skin_is_found_right() -> None:
     doctor = right()
-    assert {(one.verdict, one.remedy) for one in doctor.findings} == {("ok", "")}
+    assert {(one.verdict, one.remedy) for one in doctor.findings if one.item != "skin, sheets"} == {("ok", "")}
+    assert "has peeled off before cannot be told: coneskin commission" in finding(doctor, "skin, sheets").remedy
     assert doctor.patches == []
     assert finding(doctor, "skin, rate").value == "250 frames/s"
     assert finding(doctor, "line").value == "250 frames/s take 78 % of 115200 baud"
@@ -288,16 +289,16 @@ def test_a_short_from_the_start_is_named_and_nothing_is_made_of_its_readings(sho
         (1.015, 1.0, "warning", "the upper sheet, or its bond to A or B"),  # a fifth of an electrode has peeled off
         (1.0, 0.97, "warning", "the lower sheet, or its bond to C or D"),
         (1.03, 1.03, "ok", ""),  # another day's warmth
-        (1.08, 1.08, "warning", "both sheets have"),
+        (1.08, 1.08, "warning", "the gain of the current, or both sheets"),
     ],
 )
 def test_a_sheet_that_is_not_what_it_was_at_the_calibration_is_named(
     upper: float, lower: float, verdict: str, said: str
 ) -> None:
-    text = TEXT.replace("wrap_deg = 330", "wrap_deg = 330\nmap_along = [0, 0, 0, 0, 0, 0]\nmap_sheet_ohm = [980, 1010]")
+    text = TEXT.replace("wrap_deg = 330", "wrap_deg = 330\nmap_sheet_ohm = [980, 1010]")
     plain = parse_scene(TEXT).sensors[0].sensor
     made = replace(plain, upper_sheet_ohms=980.0 * upper, lower_sheet_ohms=1010.0 * lower)
-    found = finding(examine(text, touches=False, sensors=made), "skin, calibration")
+    found = finding(examine(text, touches=False, sensors=made), "skin, sheets")
     assert (found.verdict, said in found.remedy) == (verdict, True)
 
 

@@ -80,7 +80,7 @@ def test_silence_is_reported_once_and_ends_with_untouched_frames():
     assert bench.detector.silence(0.0, 0.02)[0].detail == "none at all"
     bench.feed(times=100)
     assert bench.detector.ready
-    assert bench.detector.age(0.110) == pytest.approx(0.011)
+    assert bench.detector.timing.age(0.110) == pytest.approx(0.011)
     assert bench.detector.silence(0.110, 0.02) == []
     (event,) = bench.detector.silence(0.130, 0.02)
     assert isinstance(event, SkinFault)

@@ -97,7 +97,7 @@ def test_the_field_of_a_sheet_is_that_of_ngsolve(slope: float, across: float, sk
 def test_a_specimen_is_drawn_by_its_seed() -> None:
     assert draw_flaws(COATED_SHEETS, 3) == draw_flaws(COATED_SHEETS, 3)
     assert draw_flaws(COATED_SHEETS, 3) != draw_flaws(COATED_SHEETS, 4)
-    (built,), _ = build_specimen([SENSOR], SheetTolerance(lead=5.0), 1, "ladder")
+    (built,), _ = build_specimen([SENSOR], SheetTolerance(lead=5.0), 1, "ladder", 0.0)
     assert all(ohms > 1.0 for ohms in built.electronics.lead_ohms)
 
 

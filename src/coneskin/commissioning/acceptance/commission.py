@@ -139,8 +139,9 @@ class Commissioner:
         wrong = [watch.contradiction(item.sensor.name) for item in procedure.sensors]
         cause = procedure.cause or "; ".join(filter(None, wrong))
         results = tuple(result for item in procedure.sensors for result in item.results)
+        ohms = watch.untouched_ohms()
         date, passed = datetime.now(UTC).isoformat(timespec="seconds"), procedure.passed and not cause
-        return CommissioningRecord(date, __version__, fingerprint(self._scene), passed, cause, by, results)
+        return CommissioningRecord(date, __version__, fingerprint(self._scene), passed, cause, by, results, ohms)
 
     def _posture(self, stack: ExitStack) -> tuple[Sequence[float] | None, Callable[[], None]]:
         """Return the joint positions to describe marks for, and a check that they stay."""
@@ -165,4 +166,4 @@ def commission_virtual_skin(scene: Scene) -> Scene:
     if not record.passed:
         raise RobotRefused(f"the virtual skin of {scene.name} has not passed its commissioning: {record.cause}")
     note = f"virtual, {len(record.marks)} marks touched by this program"
-    return replace(scene, commissioning=Commissioning(True, note))
+    return replace(scene, commissioning=Commissioning(True, note, record.sheet_ohm))

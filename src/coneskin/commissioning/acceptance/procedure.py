@@ -167,9 +167,8 @@ class Procedure(TouchJudge["TouchReading"]):
         self._number += 1
         self.over = self._number == len(self.sensors)
         details = {"sensor": item.sensor.name, "passed": not item.cause, "cause": item.cause}
-        if item.cause:
-            return Notice("sensor", f"{item.sensor.name} has NOT passed: {item.cause}", details)
-        return Notice("sensor", f"{item.sensor.name} has passed", details)
+        said = f"has NOT passed: {item.cause}" if item.cause else "has passed"
+        return Notice("sensor", f"{item.sensor.name} {said}", details)
 
     def _plan(self, item: SensorMarks) -> None:
         taken = item.plan[: len(item.results)]

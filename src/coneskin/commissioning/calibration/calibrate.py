@@ -141,12 +141,12 @@ class Calibrator:
             SkinError: the skin has a fault, cannot be read, or too few marks can be reached.
         """
         with self._session.watch() as watch:
-            ohms = [watch.untouched_ohms(item.sensor) for item in self.sensors]
+            ohms = watch.untouched_ohms()
             self._touch(TouchSequence(self.sensors, self._mark_error), watch, _VIRTUAL_DURATION)
             if self._forces:
                 self._touch(ForceSequence(self._pressed, self._forces), watch, _VIRTUAL_PRESS)
         wrong = [watch.contradiction(item.sensor.name) for item in self.sensors]
-        return [self._result(*of_sensor, by) for of_sensor in zip(self.sensors, ohms, wrong, strict=True)]
+        return [self._result(*of_sensor, by) for of_sensor in zip(self.sensors, ohms.values(), wrong, strict=True)]
 
     def _touch(self, sequence: TouchSequence | ForceSequence, watch: SkinWatch, duration: float) -> None:
         self._session.carry_out(sequence, watch, duration)

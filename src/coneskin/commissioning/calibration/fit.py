@@ -330,24 +330,15 @@ def _average(axis: _Axis, sheet: _Axis, ohms: tuple[float, float], mark_error: f
             prior = flaws + spread @ spread.T
             noise = (ratio * mark_error) ** 2
             inverse = np.linalg.inv(prior[:count, :count] + noise * np.eye(count))
-            likely = 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing) - 2.0 * math.log(ratio)
             absent = (affine, shear, ratio - 1.0, _ERROR_BEND_CAUSES.index(cause)).count(0)
+            odds = absent * math.log(_SIMPLER_ODDS) - 2.0 * math.log(ratio)
+            odds += 0.5 * (np.linalg.slogdet(inverse)[1] - missing @ inverse @ missing)
             gain = prior[count:, :count] @ inverse
             alone = inverse @ missing / np.diag(inverse)  # what is missing to what the other touches say
             covariance = prior[count:, count:] - gain @ prior[:count, count:]
-            rest = noise - mark_error**2
-            fits.append(
-                (
-                    likely + absent * math.log(_SIMPLER_ODDS),
-                    gain,
-                    covariance,
-                    alone,
-                    rest,
-                    cause != _ERROR_BEND_CAUSES[0],
-                )
-            )
-    odds, gains, covariances, alones, rests, bent = (np.array(each) for each in zip(*fits, strict=True))
-    weights = np.exp(odds - odds.max())
+            fits.append((odds, gain, covariance, alone, noise - mark_error**2, cause != _ERROR_BEND_CAUSES[0]))
+    evidence, gains, covariances, alones, rests, bent = (np.array(each) for each in zip(*fits, strict=True))
+    weights = np.exp(evidence - evidence.max())
     weights /= weights.sum()
     gain = np.tensordot(weights, gains, 1)
     mean = gain @ missing
@@ -391,8 +382,7 @@ def agreeing(sensor: Sensor, touches: Sequence[KnownTouch], mark_error: float) -
             max(_MEDIAN_TO_SIGMA * (1.0 + 5.0 / (count - 2)) * float(np.median(part)), mark_error) for part in rest
         ]
         misses = np.maximum(*(part / scale for part, scale in zip(rest, scales, strict=True)))
-        most = int(_MAX_WRONG * count)
-        limit = max(_MAX_DEVIATIONS, float(np.sort(misses)[count - most - 1]))
+        limit = max(_MAX_DEVIATIONS, float(np.sort(misses)[count - int(_MAX_WRONG * count) - 1]))
         used = misses <= limit
         rest = [np.abs(axis.rest(_solve(axis.pick(used), 2))) for axis in axes]
     return [bool(value) for value in used]

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from coneskin.commissioning.skin_watch import skin_source
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
+from coneskin.scene.build import known_sensors
 from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.suspicions import suspicions
@@ -134,7 +135,7 @@ class Doctor:
         Raises:
             SkinConnectionError: the source is gone.
         """
-        sensors = [item.sensor for item in self.scene.sensors]
+        sensors = known_sensors(self.scene)
         self._ask("do not touch the skin")
         _collect(source, _START_TIME, self._clock)  # a device that starts with its port, and what has piled up
         seen = _collect(source, _LISTEN_TIME, self._clock)

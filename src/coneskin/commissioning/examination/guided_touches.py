@@ -160,9 +160,8 @@ class _TouchCapture:
 def _normalize(sensor: Sensor, frame: Frame) -> TouchReadings:
     """Return the readings of a frame over its supplies and over the full scale; all 0 without a supply."""
     full = sensor.electronics.full_count
-    supplies = {"touch": frame.touch_supply, "radial": frame.radial_supply, "angular": frame.angular_supply}
     return tuple(
-        getattr(frame, name) / (full if name.endswith("current") else supplies[name.partition("_")[0]] or full)
+        getattr(frame, name) / (full if name.endswith("current") else getattr(frame, f"{name[:-2]}_supply") or full)
         for name in READING_NAMES
     )
 
@@ -197,6 +196,5 @@ def examine_touches(sensor: Sensor, untouched: Sequence[Frame], touched: Sequenc
         "the gains of the inputs, the shunt or the pull-downs are not what the scene says: measure pulldown_ohm, "
         "current_full_scale_ma and input_ohm of the sensor"
     )
-    return judged(
-        item, verdict, f"the median of {len(found)} touched frames is {middle:.2f} of the limit", rule, remedy
-    )
+    value = f"the median of {len(found)} touched frames is {middle:.2f} of the limit"
+    return judged(item, verdict, value, rule, remedy)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
+from coneskin.skin.detection.frame.untouched import compare_sheets
 from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
@@ -78,7 +79,7 @@ _GUIDE_NOISE = 0.01  # of the supply, on an untouched guide
 _LEAST_LEAK, _MIDDLE = 2e-7, 0.1  # S between the layers that is no noise; part of a side, where that of damp is
 _SUPPLY_ERROR = 0.10  # of the supply
 _MAX_NOISE = 8.0  # counts of 12 bits
-_CHANGED_SHEET, _CHANGED_SHEETS = 0.01, 0.05  # part by which one sheet, and both, may differ from the calibration
+_CHANGED_SHEET, _CHANGED_SHEETS = 0.01, 0.05  # part by which one sheet, and both, may differ from what is known
 _STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
@@ -142,7 +143,7 @@ def examine_sensor(
         *_levels(sensor, seen),
         *_noise(sensor, seen),
         *_currents(sensor, seen),
-        *_since_calibration(sensor, seen),
+        *_since_known(sensor, seen),
     ]
 
 
@@ -225,23 +226,19 @@ def _currents(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
     return found
 
 
-def _since_calibration(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
-    """Compare the untouched sheets with what they were when the sensor was calibrated."""
-    if sensor.place_map is None or not sensor.place_map.sheet_ohms:
-        return []
+def _since_known(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
+    """Compare the untouched sheets with what they were when the sensor was commissioned or calibrated."""
+    item = f"{sensor.name}, sheets"
+    if not sensor.known_ohms:
+        remedy = "an electrode that has peeled off before cannot be told: coneskin commission"
+        return [Finding(item, "not tried", "nobody knows what the untouched sheets were", "", remedy)]
     mean = {name: statistics.fmean(seen.counts(name)) for name in _CHANNELS}
     zero = mean["touch_current"] - sensor.bounds.touch_current_per_guide * (mean["touch_c"] + mean["touch_d"])
     drawn = [(mean[f"{phase}_current"] - zero) / max(mean["touch_supply"], 1.0) for phase in ("radial", "angular")]
     if not min(drawn) > 0.0:
         return []  # which is another finding
     ohms = sensor.sheet_ohms(*FrameInversion(sensor).untouched(*drawn))
-    upper, lower = (now / learned - 1.0 for now, learned in zip(ohms, sensor.place_map.sheet_ohms, strict=True))
-    value = f"ohm per square since then: upper {100.0 * upper:+.1f} %, lower {100.0 * lower:+.1f} %"
-    one = abs(upper - lower) > _CHANGED_SHEET
-    good = not one and max(abs(upper), abs(lower)) <= _CHANGED_SHEETS
-    sheet, wires = ("upper", "A or B") if abs(upper) > abs(lower) else ("lower", "C or D")
-    remedy = f"the {sheet} sheet, or its bond to {wires}, has changed (peeled, damp, torn): look at it, calibrate again"
-    if not one:
-        remedy = "the gain of the current has changed, or both sheets have (warmth, damp): calibrate again"
+    where, value = compare_sheets(sensor.known_ohms, ohms, _CHANGED_SHEET, _CHANGED_SHEETS)
+    remedy = f"{where}, has changed (peeled, damp, warm, torn): look at it, then calibrate and commission again"
     rule = f"one within {100 * _CHANGED_SHEET:g} % of the other, both within {100 * _CHANGED_SHEETS:g} %"
-    return [judged(f"{sensor.name}, calibration", "ok" if good else "warning", value, rule, remedy)]
+    return [judged(item, "warning" if where else "ok", value, rule, remedy)]

@@ -132,6 +132,7 @@ def build_sensor(table: Mapping[str, Any], where: str, problems: list[str]) -> t
             place_map=_place_map(frustum, values),
             force_table=forces,
             tolerance=replace(SHEET_CLASSES[values["sheet_class"]], map_error=values["map_error"]),
+            known_ohms=tuple(values["map_sheet"] or ()),
         )
         pose = Pose.from_xyz_rpy(values["xyz"], values["rpy"])
         return sensor, _place(frustum, pose, values["bend_wrap"], values["bend_turn"], values["bend_lift"])
@@ -168,7 +169,7 @@ def _place_map(frustum: Frustum, values: Mapping[str, Any]) -> PlaceMap | None:
         return None
     from coneskin.skin.calibration import PlaceMap
 
-    return PlaceMap(frustum, along or (0.0,) * 6, around or (0.0,) * 6, values["map_note"], values["map_sheet"] or ())
+    return PlaceMap(frustum, along or (0.0,) * 6, around or (0.0,) * 6, values["map_note"])
 
 
 def _force_table(values: Mapping[str, Any]) -> ForceTable | None:

@@ -247,9 +247,8 @@ def calibration_keys(place: Path, sensor: Sensor, simulated: bool) -> dict[str, 
         "map_around": list(record.map_around),
         "map_error_mm": record.map_error_mm,
         "map_note": note,
+        "map_sheet_ohm": list(record.sheet_ohm),
     }
-    if record.sheet_ohm:
-        keys["map_sheet_ohm"] = list(record.sheet_ohm)
     if record.forces_n:
         keys |= {"forces_n": list(record.forces_n), "force_levels": list(record.force_levels)}
         keys["force_error"] = record.force_error

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -270,10 +270,13 @@ class Commissioning:
     Attributes:
         valid: the places that the skin reads were compared with places that were touched.
         note: for people: how that is known, or why not.
+        sheet_ohm: what the untouched sheets of each sensor, by its number, had per square then, upper and lower [ohm].
+            A guard compares: nothing else tells an electrode that has peeled off before it starts.
     """
 
     valid: bool
     note: str
+    sheet_ohm: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @classmethod
     def from_message(cls, message: Any) -> Commissioning | None:
@@ -286,7 +289,8 @@ class Commissioning:
             return None
         if not (isinstance(message, dict) and message.get("valid") in (True, False) and "note" in message):
             raise ValueError(f"a commissioning needs valid and note, got {message!r}")
-        return cls(bool(message["valid"]), str(message["note"]))
+        known = {str(name): (float(u), float(v)) for name, (u, v) in dict(message.get("sheet_ohm", {})).items()}
+        return cls(bool(message["valid"]), str(message["note"]), known)
 
 
 @dataclass(frozen=True, slots=True)

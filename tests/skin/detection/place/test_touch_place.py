@@ -4,12 +4,14 @@ import itertools
 import math
 import random
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.detection.detector import Detector
-from coneskin.skin.detection.events import TouchBegan, TouchMoved
+from coneskin.skin.detection.events import SkinFault, TouchBegan, TouchMoved
+from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedGuides, UntouchedLeak
@@ -184,3 +186,54 @@ def test_no_place_is_certain_once_a_sheet_has_changed(radial, angular, certain):
     touch = detector.reading_now
     assert touch is not None
     assert (touch.location_valid, touch.doubt == ALTERED) == (certain, not certain)
+
+
+@pytest.mark.parametrize(
+    ("upper", "lower", "named"),
+    [
+        (1.0, 1.0, ""),
+        (1.0077, 1.0, ""),  # of the worst sheets, a layer that is 1 K warmer than the other one
+        (0.8, 0.81, ""),  # another day's warmth and damp
+        (1.044, 1.0, "the upper sheet, or its bond to A or B"),  # three tenths of electrode A or B have peeled off
+        (1.0, 1.017, "the lower sheet, or its bond to C or D"),
+        (0.97, 1.0, "the upper sheet, or its bond to A or B"),
+        (1.3, 1.3, "the gain of the current, or both sheets"),
+    ],
+)
+def test_no_place_is_certain_where_the_sheets_are_not_what_they_were_known_to_be(upper, lower, named):
+    """What peels off before the start is learned with the currents: only what they were before can tell it."""
+    detector, rng, events = Detector(replace(SENSOR, known_ohms=(1000.0 / upper, 1000.0 / lower))), random.Random(5), []
+    for number in range(4 * LEARNED):
+        contact = LayerContact(0.2, 1.5, 2e-3)
+        frame = measured(SENSOR, (contact,) if number > 3 * LEARNED else ())._asdict()
+        counts = {n: max(0, round(frame[n] + rng.gauss(0.0, 0.7))) for n in COUNTS}
+        events += detector.feed(
+            Frame(**{**frame, **counts, "sequence": number, "clock_us": 5000 * number}), 0.005 * number
+        )
+    touch = detector.reading_now
+    assert touch is not None
+    assert (touch.location_valid, touch.doubt == ALTERED) == (not named, bool(named))
+    told = [event.detail for event in events if isinstance(event, SkinFault)]
+    assert told == ([detector.altered] if named else []), "once"
+    assert detector.altered.startswith(named)
+    assert bool(named) is (f"upper {100.0 * (upper - 1.0):+.1f} %, lower" in detector.altered)
+
+
+def test_a_peel_that_goes_on_slowly_is_told_once_it_is_more_than_drift():
+    """The currents follow it, at most by the drift that is allowed."""
+    settings, rng, faults = DetectorSettings(current_drift=1e-3), random.Random(5), {}
+    detector = Detector(replace(SENSOR, known_ohms=(1000.0, 1000.0)), settings)
+    frame = measured(SENSOR, ())._asdict()
+    for number in range(7000):
+        current = frame["radial_current"] * (1.0 - 0.03 * number / 8000)
+        counts = {n: max(0, round(frame[n] + rng.gauss(0.0, 0.7))) for n in COUNTS}
+        counts["radial_current"] = round(current + rng.gauss(0.0, 0.7))
+        for event in detector.feed(
+            Frame(**{**frame, **counts, "sequence": number, "clock_us": 5000 * number}), 0.005 * number
+        ):
+            faults[number] = event
+    ((number, event),) = faults.items()
+    assert event.fault is Fault.CURRENT_CHANGED
+    assert 0.015 < 0.03 * number / 8000 < 0.025
+    assert detector.ready, "and the arm may be guarded again, without a place"
+    assert detector.altered == event.detail
