@@ -207,6 +207,7 @@ def test_facets_of_a_mesh_do_not_show_where_a_collar_belongs() -> None:
     assert _lip_play(link, lips, 0.015, 0.3e-3, facets) is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("room", "said"),
     [
@@ -229,6 +230,7 @@ def test_a_lip_holds_from_4_mm_on_and_is_flush_up_to_40(room: float, said: str) 
         assert (collar.end, collar.flush) == (1, said == "flush")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rise", "stopped"), [(7.9e-3, False), (8.1e-3, True)])
 def test_what_stands_out_by_more_than_8_mm_is_not_gripped(rise: float, stopped: bool) -> None:
     collars, _ = jig_collars(sheet(Frustum(0.05, 0.05, 0.2)), tube(bump=1.0, top=0.05 + rise))
