@@ -1,10 +1,12 @@
 """Exploration of the guard to the end of its states, and of the processes around it.
 
-    python -m bench exploration [--wrong 1] [--compiled] [--parallel 2]
+    python -m bench exploration [--wrong 1] [--compiled] [--parallel 2] [--wander 1000]
 
 The core is fed what a guard is fed, by a world in which anything may happen at any time, as long as so many things are
 wrong at once. States are abstract: the phase and the facts that decide, without times and numbers. Each invariant is
-broken once on purpose. With --compiled the build in build/compiled is explored, and nothing is broken.
+broken once on purpose. With --wander, so many runs of each case are made by chance besides: actions of any length, one
+after the other, and then a person who helps. It counts their states that were not explored. With --compiled the build
+in build/compiled is explored, and nothing is broken.
 """
 
 from __future__ import annotations
@@ -12,13 +14,16 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import random
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Hashable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from bench.report import head, show
-from tests.support.exploration.explorer import Exploration, explore
+from tests.support.exploration.explorer import Exploration, explore, wander
 from tests.support.exploration.guard_world import CONTROLS, INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
 from tests.support.exploration.process_world import (
     HEEDLESS_PROGRAM,
@@ -30,6 +35,8 @@ from tests.support.exploration.process_world import (
 
 ROOT = Path(__file__).parents[2]
 COLUMNS = ["states", "steps", "depth", "closed", "invariants", "broken", "seconds"]
+WANDERED = ["runs", "actions", "states", "of them not explored", "of the actions", "broken"]
+WAY = 30  # actions of a run by chance, before a person helps
 #: silences that somebody listens for: without each of them the arm goes on
 PARTS = ("program_silence", "process_silence", "hold_up", "guard_silence", "second_silence", "watchdog")
 SILENT = ("lose", "touch", "reset", "thaw", "restart", "kill")  # without these actions such a one is found in seconds
@@ -41,27 +48,40 @@ def row(name: str, found: Exploration, invariants: int) -> list[str]:
     return [name, *sizes, closed, str(invariants), broken, f"{found.seconds:.1f}"]
 
 
-def explore_one(settings: Settings) -> Exploration:
-    return explore(GuardWorld(settings), PROGRESS)
+def explore_one(settings: Settings, runs: int) -> tuple[Exploration, list[str]]:
+    found = explore(GuardWorld(settings), PROGRESS)
+    steps, broken, seen, left = 0, "", set[Hashable](), Counter[Hashable]()
+    for seed in range(runs):
+        draw = random.Random(seed)
+        way, states, wrong = wander(GuardWorld(settings, draw=draw), draw, WAY, PROGRESS)
+        broken = broken or (wrong and f"{wrong} (seed {seed}, after {', '.join(way)})")
+        steps, seen = steps + len(states), seen | set(states)
+        left.update(state for state in states if state not in found.reached)
+    counts = [runs, steps, len(seen), len(left), f"{100.0 * left.total() / max(1, steps):.2f} %"]
+    return found, [*map(str, counts), broken or "none"]
 
 
-def explore_guard(wrong: int, parallel: int) -> bool:
+def explore_guard(wrong: int, parallel: int, runs: int) -> bool:
     whole, things = True, "one thing" if wrong == 1 else f"{wrong} things"
     with ProcessPoolExecutor(parallel) as pool:
         found = {
             control: [
-                (reaction, pool.submit(explore_one, Settings(reaction, control, most_wrong=wrong)))
+                (reaction, pool.submit(explore_one, Settings(reaction, control, most_wrong=wrong), runs))
                 for reaction in REACTIONS
             ]
             for control in CONTROLS
         }
         for control, cases in found.items():
             done = [(reaction, case.result()) for reaction, case in cases]
-            rows = [row(reaction, each, len(INVARIANTS)) for reaction, each in done]
-            for way, said in (broken for _, each in done for broken in each.broken.values()):
+            rows = [row(reaction, each, len(INVARIANTS)) for reaction, (each, _) in done]
+            for way, said in (broken for _, (each, _) in done for broken in each.broken.values()):
                 print(f"{said}\n  after: {', '.join(way)}")
-            whole = whole and all(each.closed and not each.broken for _, each in done)
+            whole = whole and all(each.closed and not each.broken for _, (each, _) in done)
             show(f"The guard's core, {control} control, {things} wrong at once", ["reaction", *COLUMNS], rows)
+            if runs:
+                whole = whole and all(counts[-1] == "none" for _, (_, counts) in done)
+                rows = [[reaction, *counts] for reaction, (_, counts) in done]
+                show(f"Runs by chance, {control} control, {things} wrong at once", ["reaction", *WANDERED], rows)
     return whole
 
 
@@ -105,6 +125,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--wrong", type=int, default=1, help="things that may be wrong at once")
     parser.add_argument("--parallel", type=int, default=os.cpu_count(), help="cases at a time (%(default)s)")
+    parser.add_argument("--wander", type=int, default=0, metavar="RUNS", help="by chance, of each case (%(default)s)")
     parser.add_argument("--compiled", action="store_true", help="explore build/compiled")
     options = parser.parse_args()
     compiled = ROOT / "build" / "compiled"
@@ -113,7 +134,7 @@ def main() -> int:
         words = [sys.executable, "-m", "bench", "exploration", *sys.argv[1:]]
         return subprocess.run(words, cwd=ROOT, env={**os.environ, "PYTHONPATH": paths}, check=False).returncode
     print(head())
-    whole = explore_guard(options.wrong, options.parallel)
+    whole = explore_guard(options.wrong, options.parallel, options.wander)
     if not options.compiled:
         whole = explore_processes() & break_each() & whole
     return 0 if whole else 1

@@ -1,13 +1,14 @@
 """The guard's core, explored to the end of its states, and what the explorer finds in a guard that is broken."""
 
 import math
+import random
 from pathlib import Path
 
 import pytest
 
 from coneskin.runs.replay.run import read_run
 from tests.support.exploration.breaks import BREAKS, broken, find
-from tests.support.exploration.explorer import explore, follow
+from tests.support.exploration.explorer import explore, follow, wander
 from tests.support.exploration.guard_world import INVARIANTS, PROGRESS, REACTIONS, GuardWorld, Settings
 from tests.support.exploration.process_world import HEEDLESS_PROGRAM, PATIENT_CONTROLLER, Parts, ProcessWorld
 
@@ -23,6 +24,15 @@ def test_no_invariant_breaks_in_any_state(reaction: str, control: str) -> None:
     found = explore(GuardWorld(Settings(reaction, control)), PROGRESS)
     assert found.broken == {}
     assert found.closed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("reaction", "control"), [("stop", "internal"), ("retreat", "external")])
+def test_no_invariant_breaks_by_chance_where_no_state_stands_for_others(reaction: str, control: str) -> None:
+    for seed in range(8):
+        draw = random.Random(seed)
+        way, _, wrong = wander(GuardWorld(Settings(reaction, control), draw=draw), draw, 30, PROGRESS)
+        assert not wrong, (seed, way)
 
 
 @pytest.mark.long

@@ -7,6 +7,7 @@ every state a helpful way leads to a state that is wanted.
 
 from __future__ import annotations
 
+import random
 import time
 from collections import Counter, deque
 from collections.abc import Hashable, Iterable, Sequence
@@ -52,6 +53,7 @@ class Exploration:
         seconds: that it took, of the processor.
         broken: invariant -> the shortest way on which it broke, and what was said.
         by_action: how often each action led to a new state.
+        reached: the abstract states.
     """
 
     states: int
@@ -61,6 +63,7 @@ class Exploration:
     seconds: float
     broken: dict[str, tuple[tuple[str, ...], str]] = field(default_factory=dict)
     by_action: dict[str, int] = field(default_factory=dict)
+    reached: frozenset[Hashable] = frozenset()
 
 
 def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop_at_first: bool = False) -> Exploration:
@@ -116,7 +119,38 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
         if stuck:
             shortest = min(stuck, key=lambda key: ways[key][2])
             broken[progress] = (_way(ways, shortest), f"{progress}: {len(stuck)} states lead no way back")
-    return Exploration(len(ways), steps, depth, closed, time.process_time() - began, broken, dict(fresh))
+    seconds = time.process_time() - began
+    return Exploration(len(ways), steps, depth, closed, seconds, broken, dict(fresh), frozenset(ways))
+
+
+_MOST_HELP = 200  # actions of a person who helps, chosen by chance, until one gives up
+
+
+def wander(world: World, draw: random.Random, actions: int, progress: str) -> tuple[list[str], list[Hashable], str]:
+    """Let things happen by chance, one after the other from the start, and then a person help.
+
+    Nothing is gone back to, and no state stands for others: what an explorer leaves out by its abstraction would show.
+
+    Args:
+        world: in its first state.
+        draw: of the actions.
+        actions: how many, at most.
+        progress: name of the invariant that help leads to a wanted state.
+
+    Returns:
+        the way, the abstract state after each action of it, and the first invariant that broke, empty where none did.
+    """
+    way: list[str] = []
+    states: list[Hashable] = []
+    while len(way) < actions + _MOST_HELP:
+        helping = len(way) >= actions
+        if helping and world.wanted:
+            return way, states, ""
+        way.append(draw.choice([each for each in world.actions() if not helping or world.helps(each)]))
+        if wrong := world.act(way[-1]):
+            return way, states, wrong[0]
+        states.append(world.key())
+    return way, states, f"{progress}: no help leads back"
 
 
 def _way(ways: dict[Hashable, tuple[Hashable | None, str, int]], key: Hashable) -> tuple[str, ...]:

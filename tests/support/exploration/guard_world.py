@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import random
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -79,6 +80,7 @@ _CYCLE = 0.01  # s between two states, and between two frames of a sensor
 _SHORT = 2  # cycles of an action: 20 ms
 _AT_ONCE = {"clock steps back", "clock steps ahead", "a state is nonsense", "suspended", "the process reports an error"}
 _WHILE = 32  # cycles after what happens at once and leaves nothing behind that an abstract state would show: 0.32 s
+_LASTS = (1, 1, 2, 3, 5, 8, 13, 21, 34, 55)  # cycles of an action by chance
 _BRIEF = 16  # cycles at least of a wait for a change: 0.16 s
 _CLOCK_CYCLES = 1200  # in which a reset is over, and states that were late since their clock stood still are in time
 _LONG, _VERY_LONG = 80, 250  # cycles in which something has to change by itself: 0.8 s, and 2.5 s while it decides
@@ -235,15 +237,23 @@ class GuardWorld:
         settings: what is explored.
         recorded: True to keep every block.
         only: actions that may happen. Empty for all.
+        draw: of how long each action lasts. None where the same one always lasts as long.
 
     Attributes:
         core: of the guard.
         blocks: that were fed, and the events that came of them, where they are kept.
     """
 
-    def __init__(self, settings: Settings, recorded: bool = False, only: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        recorded: bool = False,
+        only: frozenset[str] = frozenset(),
+        draw: random.Random | None = None,
+    ) -> None:
         self.settings = settings
         self._only = only
+        self._draw = draw
         self.blocks: list[Block] | None = [] if recorded else None
         self.now = _START
         self.core = self._new_core()
@@ -368,6 +378,8 @@ class GuardWorld:
         judge = self._judge
         judge.events = judge.stops = 0
         cycles, before = _WHILE if action in _AT_ONCE else _SHORT, None
+        if self._draw is not None:
+            cycles = self._draw.choice(_LASTS)
         try:
             if action == "wait for a change":
                 cycles, before = self._patience(), self.key()
@@ -460,7 +472,7 @@ class GuardWorld:
             case ["suspended"]:
                 self._feed(BlockKind.SUSPENDED, b"2.000")
             case ["restart"]:
-                fresh = GuardWorld(self.settings, only=self._only)
+                fresh = GuardWorld(self.settings, only=self._only, draw=self._draw)
                 self.__dict__.update(fresh.__dict__)
         first = StopPath.DRIVER if self.settings.control == "internal" else StopPath.PROGRAM
         all_paths = frozenset(StopPath)
