@@ -22,7 +22,7 @@ from coneskin.robot.guard.speed.speed_reduction import CLEAR_TIME
 from coneskin.robot.reaction.types import Reaction
 from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.standstill import _MAX_DRIFT, _MAX_SPEED, _MAX_STARTS, _MAX_TOUCHED_DRIFT, WATCH_DURATION
-from coneskin.robot.stop.state_age import _LAG_TIME, _MAX_SUPERVISION_LAG, _OFFSET_WINDOW
+from coneskin.robot.stop.state_age import _LAG_TIME, _OFFSET_WINDOW, MAX_SUPERVISION_LAG
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 from coneskin.scene.commissioning_record import MAX_MISS, MIN_MARKS
 from coneskin.session.arm_client import ArmClient
@@ -44,7 +44,7 @@ WORDS = {3: "three", 5: "five"}
     ("promise", "said"),
     [
         ("P02", f"waits {_PLACE_TIME:g} s at most for the place"),
-        ("P15", f"where they are {1e3 * _MAX_SUPERVISION_LAG:g} ms late for {1e3 * _LAG_TIME:g} ms"),
+        ("P15", f"where they are {1e3 * MAX_SUPERVISION_LAG:g} ms late for {1e3 * _LAG_TIME:g} ms"),
         ("P15", f"one that grows over more than {_OFFSET_WINDOW:g} s"),
         ("P20", f"this happens only after {_RESTART_TIMEOUT:g} s"),
         ("P22", f"{WORDS[STANDSTILL_SAMPLES]} samples in a row ({2 * STANDSTILL_SAMPLES} ms) below"),
