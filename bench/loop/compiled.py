@@ -170,7 +170,7 @@ def touches() -> dict[str, list[float]]:
                 untouched.append(took)
             elif number in (touch, touch + 1):
                 early.append(took)
-            elif number > touch and stream.touched:
+            elif number > touch and stream.detectors[0].touched:
                 touched.append(took)
     return {
         "touch fed -> StopProgram": stops,

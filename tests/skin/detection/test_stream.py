@@ -43,7 +43,7 @@ def test_two_sensors_on_one_line_are_told_apart():
     assert {event.sensor for event in events} == {"upper half"}
     assert isinstance(events[0], TouchBegan)
     assert stream.ready
-    assert not stream.touched
+    assert not any(detector.touched for detector in stream.detectors)
     assert [detector.timing.missing for detector in stream.detectors] == [0, 0]
 
 
