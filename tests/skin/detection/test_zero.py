@@ -221,3 +221,20 @@ def test_full_scale_stays_full_scale():
     frame = frames(zero.counts, 1)[0]._replace(radial_current=4095, angular_current=2000)
     after = zero.take_off(frame)
     assert (after.touch_current, after.radial_current, after.angular_current) == (0, 4095, 2000 - zero.nominal)
+
+
+@pytest.mark.parametrize(("more", "told"), [(2, False), (-2, False), (5, True)])
+def test_two_counts_of_a_small_current_are_no_peel(more, told):
+    """The zeros of two days may differ by as much, which is 1.8 % of so few counts."""
+    full_scale = PLAIN.radial_amperes * PLAIN.electronics.full_count / 110.0
+    coarse = replace(PLAIN, electronics=replace(PLAIN.electronics, current_full_scale=full_scale))
+    (frame,) = frames(0, 1)
+
+    def learn(sensor, radial):
+        currents = UntouchedCurrents(sensor, 1e-4)
+        now = frame._replace(radial_current=radial, angular_current=110)
+        return currents, [currents.feed(now, 0.005) for _ in range(CURRENT_BLOCK)][-1]
+
+    then, _ = learn(coarse, 110)
+    _, fault = learn(replace(coarse, known_ohms=coarse.sheet_ohms(*then.sheets())), 110 + more)
+    assert (fault is not None and fault[0] is Fault.CURRENT_CHANGED) is told
