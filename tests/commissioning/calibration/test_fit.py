@@ -144,11 +144,11 @@ def test_of_four_touches_none_may_be_15_mm_beside_its_mark(wrong: int) -> None:
         fit_map(sensor, touches)
 
 
-@pytest.mark.parametrize("count", [9, 16])
-def test_a_touch_beside_its_mark_is_left_out_and_named(count: int) -> None:
+@pytest.mark.parametrize(("count", "step"), [(9, 1), (16, 3)])
+def test_a_touch_beside_its_mark_is_left_out_and_named(count: int, step: int) -> None:
     sensor = SENSORS[0]
     true = PlaceMap(sensor.frustum, (0.004, -0.012, *[0.0] * 4), (-0.006, 0.02, *[0.0] * 4))
-    for seed in range(count):
+    for seed in range(0, count, step):
         touches = touched(sensor, through(true), count, 0.3e-3, seed)
         wrong = touches[seed]
         touches[seed] = wrong._replace(read=Place(wrong.read.u + 0.008, wrong.read.phi - 0.2))
