@@ -1,13 +1,18 @@
 """Examination of a controller, against the simulated one: what another client holds, and what is not there."""
 
 import socket
+from contextlib import nullcontext
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
+from coneskin.core.errors import RobotRefused
 from coneskin.core.finding import Finding
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import ExaminationScope
 from coneskin.robot.sim.process import free_host
+from coneskin.robot.ur import examination
 from coneskin.robot.ur.examination import _braking, examine
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from tests.support.served_controller import served
@@ -24,6 +29,14 @@ def test_where_no_controller_is_the_rest_is_not_tried() -> None:
     assert (first.item, first.verdict) == ("arm, RTDE", "bad")
     assert "coneskin sim-ur" in first.remedy
     assert {one.verdict for one in rest} == {"not tried"}
+
+
+@pytest.mark.pure  # its connection is patched
+def test_an_old_controller_that_tells_no_payload_is_taken_to_carry_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    old = SimpleNamespace(ask_outputs=Mock(side_effect=RobotRefused("NOT_FOUND")))
+    monkeypatch.setattr(examination, "RtdeConnection", lambda *_: nullcontext(old))
+    (found,) = _braking(arm_model("UR5e"), "nowhere", 10.0)
+    assert (found.verdict, found.value[:35]) == ("ok", "stretched out with 0 kg, its motors")
 
 
 @pytest.mark.long
