@@ -26,10 +26,10 @@ COMPILED = {
 }
 #: the rest of core/recording stays Python: compiled, it decodes chunks no faster (76 ms for a run of 60 s, 69 as it is,
 #: 45 of them zlib's), and a compiled generator that is dropped half-way runs no ``finally``, so files stay open
-#: what stays Python there: an enumeration with a __new__, protocols, a keyword of C as a name
-UNFIT = {"journal", "deadman", "protocol"}
+#: what stays Python there: an enumeration with a __new__, protocols, a keyword of C as a name, subclasses of tuples
+UNFIT = {"journal", "deadman", "protocol", "events"}
 #: ... and what no touch waits for: preparation, other processes, ports, arrays
-PREPARATION = {"__init__", "calibration", "materials", "self_test", "sheet_functions", "fault_diagnosis", "inertia"}
+PREPARATION = {"__init__", "calibration", "materials", "self_test", "fault_diagnosis", "inertia"}
 PREPARATION |= {"inverse_kinematics"}
 PROCESSES = {"backup_stop", "guard_watchdog", "driver", "driver_process", "examination", "input_writers"}
 PROCESSES |= {"model_check", "program_io", "rtde_connection", "stop_sockets", "tcp", "ur_rtde"}

@@ -49,7 +49,10 @@ class DrivenPotentials(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """One measurement of one sensor, in the numbers of the wire (integers, counts of the converter)."""
+    """One measurement of one sensor, in the numbers of the wire (integers, counts of the converter).
+
+    What is asked of every frame is taken by its place: compiled, that is five times as quick as by its name.
+    """
 
     length: int  #: bytes on the wire, one of FRAME_LENGTHS
     device: int  #: which electronics, 0..65535

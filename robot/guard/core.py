@@ -35,8 +35,12 @@ if TYPE_CHECKING:
     from .arm_supervisor import ArmSupervisor
     from .controller_heartbeat import ControllerHeartbeat
 
-#: kept, because each look at a member of an enumeration takes Python 3.11 0.2 us
-_STARTING, _ACTIVE, _SLOWED, _RETREATING = Phase.STARTING, Phase.ACTIVE, Phase.SLOWED, Phase.RETREATING
+#: kept, because each look at a member of an enumeration takes Python 3.11 0.2 us; one by one, because what is named
+#: together is looked up in a dictionary where it is compiled
+_STARTING: Final = Phase.STARTING
+_ACTIVE: Final = Phase.ACTIVE
+_SLOWED: Final = Phase.SLOWED
+_RETREATING: Final = Phase.RETREATING
 MIN_STALL: Final = 0.02  #: s between two looks, from which on the guard itself was held up
 
 
@@ -140,11 +144,12 @@ class GuardCore:
             out: takes commands and events as soon as they are decided. A command comes before the event that explains
                 it, and before anything is computed that it does not need.
         """
-        self._fair = self._clock.fair(block.time)
-        feeder = self._feeders.get(block.kind)
+        kind, now, _ = block
+        self._fair = self._clock.fair(now)
+        feeder = self._feeders.get(kind)
         if feeder is not None:
             feeder(block, out)
-        self._poll(block.time, out)
+        self._poll(now, out)
 
     def blockers(self, now: float) -> list[str]:
         """Return why the guard cannot become active, one line each. Empty where it can."""
@@ -178,12 +183,11 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
-        guarded = self._arm is not None and self._arm.supervision.phase is _ACTIVE
-        alarm, held_up = partial(self._stop, out) if guarded else None, block.time - self._fair
-        for event in self._stream.feed(block.payload, block.time, alarm, held_up):
+        guarded, (_, now, data) = self._arm is not None and self._arm.supervision.phase is _ACTIVE, block
+        for event in self._stream.feed(data, now, partial(self._stop, out) if guarded else None, now - self._fair):
             self._feed_event(event, out)
         if self._contacts:
-            self._update_contacts(block.time, out)
+            self._update_contacts(now, out)
 
     def _stop(self, out: Outputs, name: str, level: float) -> None:
         """Stop the arm for a touch that begins. The event of the touch, which tells where it is, comes next."""
@@ -200,7 +204,6 @@ class GuardCore:
                 self._arm.feed_contacts(event.time, tuple(self._contacts.values()), out)
             self._emit_touch(out, EventName.TOUCH_ENDED, event, {"sensor": event.sensor})
         else:
-            assert isinstance(event, TouchEvent)
             self._feed_touch(event, out)
 
     def _feed_touch(self, event: TouchEvent, out: Outputs) -> None:
@@ -258,25 +261,24 @@ class GuardCore:
         what, decode = "the controller's state cannot be read", partial(arm.driver.decode_state, block.time)
         if (state := self._decode(block, what, decode, out)) is None:
             return
-        joints = arm.model.joints
-        if len(state.q) != joints or len(state.qd) != joints or not math.isfinite(sum(state.q + state.qd)):
-            self._add_fault(block.time, f"{what}: {joints} finite positions and speeds were expected", out, what)
+        joints, (now, _, q, qd, powered, stopped, running, _, _) = arm.model.joints, state
+        if len(q) != joints or len(qd) != joints or not math.isfinite(sum(q + qd)):
+            self._add_fault(now, f"{what}: {joints} finite positions and speeds were expected", out, what)
             return
-        now = state.time
         arm.sample(state, out)
         if (stepped := arm.state_age.newest.stepped) and arm.phase is not Phase.STARTING:
             what = "the controller's clock has stepped"
             self._add_fault(now, f"{what} by {stepped:+.3f} s: do not set it while the arm is guarded", out, what)
-        if state.stopped_by_safety and arm.phase.watched:
+        if stopped and arm.phase.watched:
             self._add_fault(now, "the controller's own safety system has stopped the arm", out)
-        elif not state.powered and arm.phase.watched:
+        elif not powered and arm.phase.watched:
             self._add_fault(now, "the arm is not powered any more, or its brakes are closed", out)
-        if ended := self._companions.program_ended(now, arm.state_age.newest.measured_at, state.program_running):
+        if ended := self._companions.program_ended(now, arm.state_age.newest.measured_at, running):
             self._add_fault(now, ended, out)
         heartbeat = arm.heartbeat  # does the program end by itself where no packet reaches the controller?
         if heartbeat is None:
             return
-        heartbeat.sample(now, state.program_running)
+        heartbeat.sample(now, running)
         if arm.phase not in (_ACTIVE, _SLOWED) or not (trouble := heartbeat.trouble(now)):
             return
         if heartbeat.required:
@@ -300,7 +302,7 @@ class GuardCore:
     def _decode(self, block: Block, what: str, decode: Callable[[bytes], _Decoded], out: Outputs) -> _Decoded | None:
         """Return what the controller has sent. None, after a fault that says ``what``, where it is unreadable."""
         try:
-            return decode(block.payload)
+            return decode(block[2])
         except RobotConnectionError as exc:
             self._add_fault(block.time, f"{what}: {exc}", out, what)
             return None

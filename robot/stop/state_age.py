@@ -81,13 +81,13 @@ class StateAge:
 
     def silent(self, now: float, limit: float = 0.0) -> bool:
         """Tell whether the newest fresh state is too old at a host time [s], older than a limit that may be longer."""
-        return now - self.newest.fresh_at > max(limit, self._limit)
+        return now - self.newest[2] > max(limit, self._limit)  # by its place, as every input asks
 
     def trouble(self, now: float) -> str:
         """Return what is wrong with how the states come, at a host time [s]. Empty where nothing is."""
         if self.silent(now):
             return f"the controller has sent no state for {1e3 * self._limit:g} ms"
-        if now - self.newest.very_late_since > self._limit:
+        if now - self.newest[6] > self._limit:
             causes = "its network is congested, or it does not keep up with its clock, as a simulator may not"
             return f"the controller's states come more than {1e3 * self._limit:g} ms late: {causes}"
         return ""

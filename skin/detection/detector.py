@@ -18,7 +18,7 @@ from coneskin.core.errors import SensorError
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import Frame, Status
 
-from .events import ReportedTouch, SkinEvent, SkinFault
+from .events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from .fault_diagnosis import DIAGNOSED_FAULTS, FaultDiagnosis
 from .frame.contact_matrix import FrameInversion
 from .frame.faults import Fault
@@ -44,6 +44,7 @@ _MAX_CONTRADICTIONS: Final = 2.5  # frames; the fourth in a row is a fault, thre
 _UNREADY_TIME: Final = 1.0  # s of a sensor that is neither touched nor quiet, after which it says so: it is not ready
 _QUIET_WEIGHT: Final = 9  # frames that are neither, besides one, that a quiet one takes off their count
 _CONTRADICTION_DECAY: Final = 0.1  # frames; each good frame takes so many off the count
+_FULL_TURN: Final = 2.0 * math.pi
 
 
 class _StuckValues:
@@ -68,6 +69,69 @@ class _StuckValues:
         m, n = m + 1 if y == d else 0, n + 1 if z == e else 0
         self._last, self._still = (v, w, x, y, z), (i, j, k, m, n)
         return i >= most or j >= most or k >= most or m >= most or n >= most
+
+
+class ReportedTouch:
+    """The touches of one sensor as its events tell them.
+
+    Args:
+        sensor: the sensor.
+        settings: by how much a touch has to change.
+    """
+
+    def __init__(self, sensor: Sensor, settings: DetectorSettings) -> None:
+        self._sensor = sensor
+        self._radius = max(sensor.frustum.radius1, sensor.frustum.radius2)
+        self._step, self._far = settings.level_step, settings.move_distance
+        # level, place and doubt; a place was certain, a line was found
+        self._told = 0.0, 0.0, 0.0, "", False, False
+
+    def begin(self, touch: TouchReading) -> TouchBegan:
+        """Return the event with which a touch begins.
+
+        Args:
+            touch: the frame that confirms it.
+        """
+        self._told = touch.level, touch.u, touch.phi, touch.doubt, not touch.doubt, False
+        return tuple.__new__(TouchBegan, (self._sensor.name, *touch))  # quicker than TouchBegan()
+
+    def move(self, touch: TouchReading) -> TouchMoved | None:
+        """Return the event that a frame of a touch makes due. None where it tells nothing new.
+
+        Args:
+            touch: the frame, above the release threshold.
+        """
+        level_told, u_told, phi_told, doubted, placed, extended = self._told
+        valid, step = touch.location_valid, touch.level - level_told
+        shape = None if valid else touch.elongation
+        if (
+            valid is not (not doubted)
+            or not -self._step <= step <= self._step
+            or (valid and self._distance(touch.u - u_told, touch.phi - phi_told) > self._far)
+            or (shape is not None and not extended)
+        ):
+            time, level, u, phi, _, doubt = touch[:6]
+            certain = (u_told, phi_told) if placed and not valid else (u, phi)
+            if shape is None:
+                u, phi = certain  # the last place that was certain is the better guess; a line has its own
+            self._told = level, *certain, doubt, placed or not doubt, extended or shape is not None
+            return tuple.__new__(TouchMoved, (self._sensor.name, time, level, u, phi, *touch[4:]))
+        return None
+
+    def end(self, frame: Frame, now: float, level: float) -> TouchEnded:
+        """Return the event with which a touch ends, at the last place that was told.
+
+        Args:
+            frame: the one that confirms the end.
+            now: host clock when it arrived [s].
+            level: its level, the drift taken off.
+        """
+        _, u, phi, _, placed, _ = self._told
+        return TouchEnded(self._sensor.name, now, level, u, phi, placed, "", frame.clock_us, frame.sequence)
+
+    def _distance(self, u: float, phi: float) -> float:
+        """Return the distance of two places that differ by this [m], never too small."""
+        return math.hypot(u, self._radius * math.remainder(phi, _FULL_TURN))
 
 
 class Detector:
@@ -133,10 +197,10 @@ class Detector:
             what happened, mostly nothing.
         """
         events: list[SkinEvent] = []
-        restarted = frame.status & _RESTARTED_BIT and self.timing.frames > 0
+        restarted = frame[3] & _RESTARTED_BIT and self.timing.frames > 0
         if restarted:
             self.timing.restart()
-        late = self.timing.feed(frame.sequence, frame.clock_us, now)
+        late = self.timing.feed(frame[4], frame[5], now)
         if restarted:
             self._report(events, Fault.RESTARTED, frame, now)
         elif late is not None:
@@ -144,7 +208,7 @@ class Detector:
             if late is Fault.REPLAYED:
                 return events  # an old frame says nothing about now
         zero = self._zero
-        resting = frame.touch_c + frame.touch_d < 2.0 * self._release * frame.touch_supply
+        resting = frame[6] + frame[7] < 2.0 * self._release * frame[15]
         if resting and zero.feed(frame, self.timing.period, not self.ready):
             self._currents.restart()  # what was learned of them had another zero
         if zero.counts:

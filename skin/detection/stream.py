@@ -77,7 +77,7 @@ class TouchStream:
             for detector in self.detectors:
                 detector.timing.held_up = held_up
         for frame in frames:
-            found = self._by_number.get(frame.device << 8 | frame.sensor)
+            found = self._by_number.get(frame[1] << 8 | frame[2])
             if found is not None:
                 happened = found.feed(frame, now, alarm)
                 if happened:

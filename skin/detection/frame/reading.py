@@ -68,13 +68,13 @@ def judge(sensor: Sensor, frame: Frame, noise: float = 0.0) -> tuple[float, Faul
 
     The level is the mean of the two guides in the touch phase over the supply. Arguments as of ``read``.
     """
-    supply, bounds = frame.touch_supply, sensor.bounds
+    supply, bounds = frame[15], sensor.bounds
     low, high = bounds.supply_low, bounds.supply_high
-    if not (low <= supply <= high and low <= frame.radial_supply <= high and low <= frame.angular_supply <= high):
+    if not (low <= supply <= high and low <= frame[16] <= high and low <= frame[17] <= high):
         return 0.0, Fault.DEVICE if frame.status & _STATUS_FAULTS else Fault.SUPPLY
-    level = (frame.touch_c + frame.touch_d) / (2.0 * supply)
+    level = (frame[6] + frame[7]) / (2.0 * supply)
     fault = _fault(sensor, frame, level, noise)
-    if fault is None and frame.driven is not None and _loses_drive(sensor, frame):
+    if fault is None and frame[18] is not None and _loses_drive(sensor, frame):
         fault = Fault.LEAD
     return level, fault
 
@@ -113,15 +113,16 @@ def read(
     spread1, spread2 = limits.guide_spread * frame.radial_supply, limits.guide_spread * frame.angular_supply
     split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
     split = -spread1 <= split1 <= spread1 and -spread2 <= split2 <= spread2
-    return Reading(sensor, sequence, clock_us, level, matrix, firm and inside and split and fault is None, fault)
+    placed = firm and inside and split and fault is None
+    return tuple.__new__(Reading, (sensor, sequence, clock_us, level, matrix, placed, fault))
 
 
 def _fault(sensor: Sensor, frame: Frame, level: float, noise: float) -> Fault | None:
     """Return the first thing that is wrong with a frame whose supply is right, or None."""
     touch_c, touch_d, current0, radial_c, radial_d, current1, angular_a, angular_b, current2 = frame[6:15]
-    supply, supply1, supply2 = frame.touch_supply, frame.radial_supply, frame.angular_supply
+    supply, supply1, supply2 = frame[15], frame[16], frame[17]
     bounds, limits = sensor.bounds, sensor.thresholds
-    if frame.status & _STATUS_FAULTS:
+    if frame[3] & _STATUS_FAULTS:
         return Fault.DEVICE
     touched = level >= limits.touch_level
     lower_is_less = current2 * bounds.radial_low < current1 * bounds.angular_low  # a wire fed from elsewhere takes both

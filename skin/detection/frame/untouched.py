@@ -110,11 +110,11 @@ class UntouchedCurrents:
         """
         count, zero, radial, angular = self._block
         count += 1
-        zero += frame.touch_current - (frame.touch_c + frame.touch_d) * self._per_guide
-        radial += frame.radial_current / frame.radial_supply
-        angular += frame.angular_current / frame.angular_supply
+        zero += frame[8] - (frame[6] + frame[7]) * self._per_guide
+        radial += frame[11] / frame[16]
+        angular += frame[14] / frame[17]
         self._block = count, zero, radial, angular
-        return None if count < CURRENT_BLOCK else self._close(frame.touch_supply, period)
+        return None if count < CURRENT_BLOCK else self._close(frame[15], period)
 
     def _close(self, supply: int, period: float) -> tuple[Fault, str] | None:
         (_, sum0, sum1, sum2), (frames, radial, angular), (last, known) = self._block, self.means, self._newest
@@ -283,12 +283,9 @@ class UntouchedZero:
     def take_off(self, frame: Frame) -> Frame:
         """Return a frame whose drive currents are 0 where none flows; one at full scale stays there."""
         zero, full = self.counts, self._full
-        touch, radial, angular = frame.touch_current, frame.radial_current, frame.angular_current
-        return frame._replace(
-            touch_current=touch - zero if touch < full else full,
-            radial_current=radial - zero if radial < full else full,
-            angular_current=angular - zero if angular < full else full,
-        )
+        touch, radial, angular = (c - zero if c < full else full for c in (frame[8], frame[11], frame[14]))
+        values = (*frame[:8], touch, *frame[9:11], radial, *frame[12:14], angular, *frame[15:])
+        return tuple.__new__(Frame, values)  # a tenth of the time of frame._replace
 
 
 # part of the supply; sudden potential of a guide, or difference of two, that nothing explains
@@ -333,14 +330,13 @@ class UntouchedGuides:
             level: its level.
             period: time from frame to frame [s].
         """
-        supply = frame.touch_supply
-        radial = 0.5 * (frame.radial_c + frame.radial_d) / frame.radial_supply
-        angular = 0.5 * (frame.angular_a + frame.angular_b) / frame.angular_supply
+        c, d, a, b, supply = frame[9], frame[10], frame[12], frame[13], frame[15]
+        radial, angular = 0.5 * (c + d) / frame[16], 0.5 * (a + b) / frame[17]
         rest1, rest2, rest = self._rest
         if rest == math.inf:
             self._rest = rest1, rest2, rest = radial, angular, level
         step1, step2 = radial - rest1, angular - rest2
-        split1, split2 = frame.radial_c - frame.radial_d, frame.angular_a - frame.angular_b
+        split1, split2 = c - d, a - b
         differ = _GUIDE_JUMP * supply
         if (
             step1 > _GUIDE_JUMP

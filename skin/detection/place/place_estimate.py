@@ -137,13 +137,14 @@ def _posterior(
     share = 1.0 / whole
     strength, mean, square, log_radius = parts / part, first * share, second * share, logs * share
     spread = square - mean * mean
-    return _DipoleStrength(
+    values = (
         strength,
         spread + (mean - strength) ** 2,
         min(1.0, spread / variance) if variance > 0.0 else 1.0,
         log_radius,
         math.sqrt(max(0.0, log_squares * share - log_radius * log_radius) + _MODEL_RADIUS * _MODEL_RADIUS),
     )
+    return tuple.__new__(_DipoleStrength, values)  # quicker than _DipoleStrength()
 
 
 _REAL_VARIANCE: Final = 4.0**2  # deviations, squared; an inequality below is taken for noise and drift
@@ -332,7 +333,7 @@ class PlaceEstimator:
         stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
-        return PlaceEstimate(
+        values = (
             u,
             phi,
             (squared * xx, squared * xy, squared * yy),
@@ -343,6 +344,7 @@ class PlaceEstimator:
             dipole,
             edge_c,
         )
+        return tuple.__new__(PlaceEstimate, values)
 
     def disc_dipole(self, radius: float, conductance: float, edge: float) -> float:
         """Return the dipole of one disc of a radius [m] that has a conductance [S], on the sheet [S m^2].

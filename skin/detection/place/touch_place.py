@@ -161,11 +161,12 @@ class TouchPlace:
         if not doubt and covariance[2] > self._loosest * (self._radius1 + self._taper * u) ** 2:
             doubt = _UNKNOWN_NORMAL
         self._located = self._located or not doubt
-        return TouchReading(
+        values = (
             *(now, level, u, phi, not doubt, doubt, frame.clock_us, frame.sequence),
             *(covariance if steady else None, *(estimate.radius() if steady else (None, None))),
             *(self._single.elongation(whole) if doubt else None, velocity),
         )
+        return tuple.__new__(TouchReading, values)  # quicker than TouchReading()
 
     def _placed(self, x: float, y: float, estimate: PlaceEstimate | None) -> tuple[float, float]:
         move_x, move_y = (0.0, 0.0) if estimate is None else (estimate.move_x, estimate.move_y)

@@ -7,8 +7,8 @@ import pytest
 
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.detector import Detector
-from coneskin.skin.detection.events import ReportedTouch, SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
+from coneskin.skin.detection.detector import Detector, ReportedTouch
+from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.faults import Fault
 from coneskin.skin.detection.frame.reading import TouchReading
