@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 import time
 from collections import Counter, deque
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Container, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -66,7 +66,13 @@ class Exploration:
     reached: frozenset[Hashable] = frozenset()
 
 
-def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop_at_first: bool = False) -> Exploration:
+def explore(
+    world: World,
+    progress: str = "",
+    most_states: int = 1_000_000,
+    stop_at_first: bool = False,
+    starts: Mapping[Hashable, Any] | None = None,
+) -> Exploration:
     """Explore a world to the end.
 
     Args:
@@ -74,6 +80,7 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
         progress: name of the invariant that a helpful way leads from every state to a wanted one. Empty for none.
         most_states: after which to give up.
         stop_at_first: end with the first broken invariant.
+        starts: more states to go on from, as this world has saved them.
     """
     began = time.process_time()
     first = world.key()
@@ -82,6 +89,9 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
     wanted = {first} if world.wanted else set()
     broken: dict[str, tuple[tuple[str, ...], str]] = {}
     queue: deque[tuple[Hashable, Any]] = deque([(first, world.save())])
+    for key, saved in (starts or {}).items():
+        ways[key], back[key] = (None, "", 0), []
+        queue.append((key, saved))
     fresh: Counter[str] = Counter()
     steps = depth = 0
     while queue and len(ways) < most_states and not (stop_at_first and broken):
@@ -126,7 +136,9 @@ def explore(world: World, progress: str = "", most_states: int = 1_000_000, stop
 _MOST_HELP = 200  # actions of a person who helps, chosen by chance, until one gives up
 
 
-def wander(world: World, draw: random.Random, actions: int, progress: str) -> tuple[list[str], list[Hashable], str]:
+def wander(
+    world: World, draw: random.Random, actions: int, progress: str, known: Container[Hashable] = ()
+) -> tuple[list[str], list[tuple[Hashable, Any]], str]:
     """Let things happen by chance, one after the other from the start, and then a person help.
 
     Nothing is gone back to, and no state stands for others: what an explorer leaves out by its abstraction would show.
@@ -136,12 +148,14 @@ def wander(world: World, draw: random.Random, actions: int, progress: str) -> tu
         draw: of the actions.
         actions: how many, at most.
         progress: name of the invariant that help leads to a wanted state.
+        known: abstract states that need not be saved.
 
     Returns:
-        the way, the abstract state after each action of it, and the first invariant that broke, empty where none did.
+        the way, the abstract state after each action of it with what was saved there, and the first invariant that
+        broke, empty where none did.
     """
     way: list[str] = []
-    states: list[Hashable] = []
+    states: list[tuple[Hashable, Any]] = []
     while len(way) < actions + _MOST_HELP:
         helping = len(way) >= actions
         if helping and world.wanted:
@@ -149,7 +163,8 @@ def wander(world: World, draw: random.Random, actions: int, progress: str) -> tu
         way.append(draw.choice([each for each in world.actions() if not helping or world.helps(each)]))
         if wrong := world.act(way[-1]):
             return way, states, wrong[0]
-        states.append(world.key())
+        key = world.key()
+        states.append((key, None if key in known else world.save()))
     return way, states, f"{progress}: no help leads back"
 
 

@@ -241,6 +241,7 @@ class GuardWorld:
 
     Attributes:
         core: of the guard.
+        draw: as above.
         blocks: that were fed, and the events that came of them, where they are kept.
     """
 
@@ -253,7 +254,7 @@ class GuardWorld:
     ) -> None:
         self.settings = settings
         self._only = only
-        self._draw = draw
+        self.draw = draw
         self.blocks: list[Block] | None = [] if recorded else None
         self.now = _START
         self.core = self._new_core()
@@ -276,6 +277,7 @@ class GuardWorld:
 
     def restore(self, saved: Snapshot) -> None:
         restore(saved)
+        self.draw = None  # from here on the same action lasts as long again
 
     def key(self) -> Hashable:
         core, judge = self.core, self._judge
@@ -378,8 +380,8 @@ class GuardWorld:
         judge = self._judge
         judge.events = judge.stops = 0
         cycles, before = _WHILE if action in _AT_ONCE else _SHORT, None
-        if self._draw is not None:
-            cycles = self._draw.choice(_LASTS)
+        if self.draw is not None:
+            cycles = self.draw.choice(_LASTS)
         try:
             if action == "wait for a change":
                 cycles, before = self._patience(), self.key()
@@ -472,7 +474,7 @@ class GuardWorld:
             case ["suspended"]:
                 self._feed(BlockKind.SUSPENDED, b"2.000")
             case ["restart"]:
-                fresh = GuardWorld(self.settings, only=self._only, draw=self._draw)
+                fresh = GuardWorld(self.settings, only=self._only, draw=self.draw)
                 self.__dict__.update(fresh.__dict__)
         first = StopPath.DRIVER if self.settings.control == "internal" else StopPath.PROGRAM
         all_paths = frozenset(StopPath)
