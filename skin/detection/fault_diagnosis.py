@@ -384,13 +384,14 @@ class _Fit:
         self.hypothesis = hypothesis
         self._observation, self._sheets = observation, (upper, lower)
         self._best = _NO_CONTACT, [0.0], math.inf  # contact, errors and the sum of their squares
-        self._round, self._damping = 0, 0.01
+        self._pace = 0, 0.01  # steps, and how much they are damped
         self.sum = math.inf
 
     def improve(self) -> bool:
         """Make the next step. Tell whether it was the last."""
-        self._round += 1
-        if self._round == 1:
+        number, damping = self._pace[0] + 1, self._pace[1]
+        self._pace = number, damping
+        if number == 1:
             return self._start()
         contact, errors, total = self._best
         columns = []
@@ -401,7 +402,7 @@ class _Fit:
         pp, qq, rr = _dot(p, p), _dot(q, q), _dot(r, r)
         pq, pr, qr = _dot(p, q), _dot(p, r), _dot(q, r)
         a, b, c = -_dot(p, errors), -_dot(q, errors), -_dot(r, errors)
-        more = 1.0 + self._damping
+        more = 1.0 + damping
         pp, qq, rr = pp * more + 1e-9, qq * more + 1e-9, rr * more + 1e-9
         one, two, three = qq * rr - qr * qr, pr * qr - pq * rr, pq * qr - pr * qq
         scale = 1.0 / (pp * one + pq * two + pr * three)
@@ -422,11 +423,11 @@ class _Fit:
             settled = total - better < 1e-3 * total + 1e-3
             self._best = moved, after, better
             self.sum = min(self.sum, better + _CONTACT_GAIN)
-            self._damping *= 0.2
+            self._pace = number, 0.2 * damping
         else:
-            self._damping *= 8.0
-        hopeless = self._round >= _TRIAL_STEPS and self._best[2] > _HOPELESS_SUM
-        return settled or hopeless or self._round >= _MAX_STEPS
+            self._pace = number, 8.0 * damping
+        hopeless = number >= _TRIAL_STEPS and self._best[2] > _HOPELESS_SUM
+        return settled or hopeless or number >= _MAX_STEPS
 
     def _start(self) -> bool:
         """Take the best of a few contacts. Tell whether none is needed."""

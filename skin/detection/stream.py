@@ -50,7 +50,7 @@ class TouchStream:
             listing = ", ".join(f"{s.name} = {s.number}" for s in sensors)
             raise SensorError(f"sensors on one stream must differ in name and in (device_id, sensor_id), got {listing}")
         self.unknown: dict[tuple[int, int], int] = {}
-        self._bad = self._skipped = 0
+        self._skipped = 0, 0  # bytes in all, and those that are not forgiven yet
         self._versions = 0.0  # packets of unknown versions that are no news
         self._corrupt = self._starting = False
 
@@ -86,7 +86,8 @@ class TouchStream:
             else:
                 self._note_unknown(events, frame, now)
                 alarm = None
-        if self.decoder.bytes_skipped != self._skipped or self._bad:
+        skipped, bad = self._skipped
+        if self.decoder.bytes_skipped != skipped or bad:
             self._watch_bytes(events, len(frames), now)
         if self.decoder.unknown_versions > self._versions:
             self._versions = math.inf  # it is reported once
@@ -130,16 +131,16 @@ class TouchStream:
         many boards print a banner when they start.
         """
         skipped = self.decoder.bytes_skipped
-        self._bad = max(0, self._bad + skipped - self._skipped - _BAD_BYTES_DECAY * frames)
-        self._skipped = skipped
-        if self._bad > _MAX_BAD_BYTES:
-            self._bad = _MAX_BAD_BYTES
+        before, bad = self._skipped
+        bad = max(0, bad + skipped - before - _BAD_BYTES_DECAY * frames)
+        self._skipped = skipped, min(bad, _MAX_BAD_BYTES)
+        if bad > _MAX_BAD_BYTES:
             if not self.ready and not self._corrupt:
                 self._starting = True
             elif not self._corrupt:
                 self._corrupt = True
                 events.append(SkinFault("", now, 0, 0, Fault.CORRUPT, self._bad_bytes()))
-        elif not self._bad:
+        elif not bad:
             self._corrupt = self._starting = False
         if self._starting:
             for detector in self.detectors:
