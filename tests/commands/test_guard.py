@@ -73,7 +73,7 @@ def test_rules_distances_and_limits_are_listed(tmp_path, capsys):
     lines = {line.split("  ")[0].strip(): line for line in out.splitlines()}
     assert "then at most 60 mm at up to 150 mm/s within 2 s" in lines["reaction"]
     assert "no point of the arm farther than 100 mm or faster than 250 mm/s" in lines["reaction"]
-    assert lines["reaction"].endswith("TOWARDS WHAT NO SKIN COVERS at up to 15 mm/s")
+    assert lines["reaction"].endswith("TOWARDS WHAT NO SKIN COVERS at up to 8 mm/s")
     first, second = (line for line in out.splitlines() if line.startswith("rule "))
     assert first.endswith("where touched on the forearm and level above 0.5")
     assert "slow to 30 %" in second

@@ -77,9 +77,8 @@ _SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoin
 _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
 
 
-#: m/s of a surface that no skin covers, outward, where the scene allows that: the joints feel what it meets in 15 ms
-MAX_BARE_SPEED = 0.015
-_MAX_PUSHED_SPEED = 0.008  # m/s; the same where a push moves the arm: it drives it on into what is met
+# m/s of a surface that no skin covers, outward, where the scene allows that: a rigid thing stops it within 0.1 mm
+_MAX_BARE_SPEED = 0.008
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
 
@@ -263,10 +262,9 @@ class MotionStream:
         if not self._allowed:
             return _bare_way(bare, self._start, ahead) or step
         speed = bare.way(state.q, ahead)[0] / _BARE_STEP
-        most = _MAX_PUSHED_SPEED if self.how == "push" else MAX_BARE_SPEED
-        if speed <= most:
+        if speed <= _MAX_BARE_SPEED:
             return step
-        share = most / speed
+        share = _MAX_BARE_SPEED / speed
         by = (*step.clipped_by, "bare side")
         return replace(step, qd=tuple(share * v for v in step.qd), away=share * step.away, clipped_by=by)
 

@@ -26,7 +26,7 @@ _HEARTBEAT_WORDS = {
 #: reaction.bare_side -> what it means
 _BARE_WORDS = {
     "stop": "; not towards what no skin covers",
-    "allowed": "; TOWARDS WHAT NO SKIN COVERS at up to 15 mm/s",
+    "allowed": "; TOWARDS WHAT NO SKIN COVERS at up to 8 mm/s",
     "fast": "; TOWARDS WHAT NO SKIN COVERS as fast as elsewhere",
 }
 

@@ -123,7 +123,7 @@ _REACTION_SETTINGS = with_meanings(
         known. Points farther out from the joints that turn go farther than the touched point. So a retreat from a
         touch near a joint mostly ends here, before `distance_mm`
     bare_side: whether a retreat, or giving way, may move outward what no skin covers. With "stop" the arm then only
-        stops. With "allowed" no bare point is faster than 15 mm/s, giving way 8, and only the motor currents feel what
+        stops. With "allowed" no bare point is faster than 8 mm/s, and only the motor currents feel what
         it meets. With "fast" it is as fast as elsewhere: only where nothing can be there
     full_level: level of the touch at which comply gives way with all of `speed_mm_s`
     slow_to: position of the controller's speed slider while slow
