@@ -34,9 +34,9 @@ if TYPE_CHECKING:  # a reaction that only stops loads neither
     from .speed.speed_limit import SpeedLimit
 
 #: kept as in ``core``
-_ACTIVE: Final = Phase.ACTIVE
-_SLOWED: Final = Phase.SLOWED
-_RETREATING: Final = Phase.RETREATING
+_ACTIVE_PHASE: Final = Phase.ACTIVE
+_SLOWED_PHASE: Final = Phase.SLOWED
+_RETREATING_PHASE: Final = Phase.RETREATING
 _PLACE_TIME: Final = 0.3  # s that a standing arm waits for the place of a touch; at 12 bits it takes 10 to 60 frames
 
 
@@ -247,7 +247,7 @@ class ArmSupervisor:
         self.state = state
         stop, measured_at, phase = self._stop, self.state_age.feed(state), self.supervision.phase
         if self._planner is not None:
-            self._planner.torque.feed(state, phase is _ACTIVE and not self._touches.contacts)
+            self._planner.torque.feed(state, phase is _ACTIVE_PHASE and not self._touches.contacts)
         if state.stopped_by_safety or not state.powered:
             self._bar("the controller has stopped the arm itself")  # nothing of ours moves it then
         elif self.state_age.newest.stepped:
@@ -256,9 +256,9 @@ class ArmSupervisor:
             if self.state_age.newest.fresh and self._stands(state, measured_at, out):
                 self.speed_reduction.put_back(state.time, out)
                 self._decide(state, state.time + _PLACE_TIME, out)
-        elif phase is _RETREATING:
+        elif phase is _RETREATING_PHASE:
             self._move(state, out)
-        elif phase is _ACTIVE:
+        elif phase is _ACTIVE_PHASE:
             if self._speed_limit is not None and (
                 why := self._speed_limit.sample(state, self.speed_reduction.known(state.time), out)
             ):
@@ -284,7 +284,7 @@ class ArmSupervisor:
                 speed = None if self.state is None else self.state.speed
                 emit(out, EventName.STOP_FAILED, now, rounds=rounds, speed=speed)
             self.speed_reduction.note_stop(stop.used)
-        elif phase is _SLOWED:
+        elif phase is _SLOWED_PHASE:
             slowed = self.speed_reduction.now
             if why := self.speed_reduction.poll(now, fair, bool(self._touches.contacts)):
                 contact = self._touches.find(0 if slowed is None else slowed.approach.exceeded[0])

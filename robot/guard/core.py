@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 
 #: kept, because each look at a member of an enumeration takes Python 3.11 0.2 us; one by one, because what is named
 #: together is looked up in a dictionary where it is compiled
-_STARTING: Final = Phase.STARTING
-_ACTIVE: Final = Phase.ACTIVE
-_SLOWED: Final = Phase.SLOWED
-_RETREATING: Final = Phase.RETREATING
+_STARTING_PHASE: Final = Phase.STARTING
+_ACTIVE_PHASE: Final = Phase.ACTIVE
+_SLOWED_PHASE: Final = Phase.SLOWED
+_RETREATING_PHASE: Final = Phase.RETREATING
 MIN_STALL: Final = 0.02  #: s between two looks, from which on the guard itself was held up
 
 
@@ -183,7 +183,7 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
-        guarded, (_, now, data) = self._arm is not None and self._arm.supervision.phase is _ACTIVE, block
+        guarded, (_, now, data) = self._arm is not None and self._arm.supervision.phase is _ACTIVE_PHASE, block
         for event in self._stream.feed(data, now, partial(self._stop, out) if guarded else None, now - self._fair):
             self._feed_event(event, out)
         if self._contacts:
@@ -279,7 +279,7 @@ class GuardCore:
         if heartbeat is None:
             return
         heartbeat.sample(now, running)
-        if arm.phase not in (_ACTIVE, _SLOWED) or not (trouble := heartbeat.trouble(now)):
+        if arm.phase not in (_ACTIVE_PHASE, _SLOWED_PHASE) or not (trouble := heartbeat.trouble(now)):
             return
         if heartbeat.required:
             self._add_fault(now, trouble, out)
@@ -421,17 +421,17 @@ class GuardCore:
             self._feed_event(event, out)
         arm = self._arm
         if arm is not None:
-            if arm.phase is not _STARTING and (trouble := arm.state_age.trouble(fair)):
+            if arm.phase is not _STARTING_PHASE and (trouble := arm.state_age.trouble(fair)):
                 self._add_fault(now, trouble, out)
             for why, paths in self._companions.poll(fair):  # silent: stop by a path that does not need it
                 if arm.phase is not Phase.STARTING:
                     self._add_fault(now, why, out)
                     if paths:
                         arm.lose(paths, now, for_good=False)
-            if arm.phase is _RETREATING and (stale := self._stale(now) or arm.state_age.stale(now)):
+            if arm.phase is _RETREATING_PHASE and (stale := self._stale(now) or arm.state_age.stale(now)):
                 arm.abandon_motion(now, stale, out)  # what supervises it is too old
             arm.poll(now, fair, out)
-        if self.phase is not _STARTING and not self._activation.resetting:
+        if self.phase is not _STARTING_PHASE and not self._activation.resetting:
             return
         blockers = self.blockers(now)
         if self.phase not in (Phase.STARTING, Phase.LATCHED):
