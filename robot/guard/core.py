@@ -144,9 +144,9 @@ class GuardCore:
             out: takes commands and events as soon as they are decided. A command comes before the event that explains
                 it, and before anything is computed that it does not need.
         """
-        kind, now, _ = block
+        now = block[1]  # by its place: compiled, unpacking it takes an iterator
         self._fair = self._clock.fair(now)
-        feeder = self._feeders.get(kind)
+        feeder = self._feeders.get(block[0])
         if feeder is not None:
             feeder(block, out)
         self._poll(now, out)
@@ -183,8 +183,8 @@ class GuardCore:
     # ---- the skin
 
     def _feed_skin(self, block: Block, out: Outputs) -> None:
-        guarded, (_, now, data) = self._arm is not None and self._arm.supervision.phase is _ACTIVE_PHASE, block
-        for event in self._stream.feed(data, now, partial(self._stop, out) if guarded else None, now - self._fair):
+        guarded, now = self._arm is not None and self._arm.supervision.phase is _ACTIVE_PHASE, block[1]
+        for event in self._stream.feed(block[2], now, partial(self._stop, out) if guarded else None, now - self._fair):
             self._feed_event(event, out)
         if self._contacts:
             self._update_contacts(now, out)
@@ -261,7 +261,8 @@ class GuardCore:
         what, decode = "the controller's state cannot be read", partial(arm.driver.decode_state, block.time)
         if (state := self._decode(block, what, decode, out)) is None:
             return
-        joints, (now, _, q, qd, powered, stopped, running, _, _) = arm.model.joints, state
+        joints, now, q, qd = arm.model.joints, state[0], state[2], state[3]
+        powered, stopped, running = state[4], state[5], state[6]
         if len(q) != joints or len(qd) != joints or not math.isfinite(sum(q + qd)):
             self._add_fault(now, f"{what}: {joints} finite positions and speeds were expected", out, what)
             return
