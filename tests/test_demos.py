@@ -97,7 +97,7 @@ def test_guard_a_program() -> None:
 
 def test_replay_as_test() -> None:
     out = play("05_replay_as_test.py")
-    assert "touch on sensor 0/0 (tube) at u = 199.9 mm" in out
+    assert "touch on sensor 0/0 (tube) at u = 200.0 mm" in out
     assert out.endswith("the same events, bit by bit\n")
 
 
@@ -107,7 +107,7 @@ def test_runs_as_tests() -> None:
     out = play("06_runs_as_tests.py")
     assert re.search(r"collision\.rec: \d+ kB, from", out)
     assert out.count("1 passed") == 3
-    assert re.search(r"contact 1: u 198\.\d+ -> 199\.\d+ mm", out)
+    assert re.search(r"contact 1: u 198\.\d+ -> 200\.\d+ mm", out)
     assert out.index("1 failed") < out.index("golden events written")
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from coneskin.core.errors import SceneError
 from coneskin.core.keys import Key
+from coneskin.robot.driver.liveness import MAX_ESCALATE
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.settings import _detector_keys, override_detector, override_settings, parse_choices, parse_settings
 from coneskin.skin.detection.frame.settings import DetectorSettings
@@ -160,3 +161,10 @@ def defaults() -> list[tuple[Key, Any]]:
 )
 def test_choices_are_values_with_commas_between_them(word: str, values: list[Any]) -> None:
     assert parse_choices(word) == ("a.b", values)
+
+
+def test_the_next_stop_path_waits_no_longer_than_what_a_measured_controller_is_held_against() -> None:
+    table = "[monitoring]\nescalate_ms = {:g}\n"
+    assert parse_scene(FULL.replace("[monitoring]\n", table.format(1e3 * MAX_ESCALATE), 1)) is not None
+    with pytest.raises(SceneError, match="escalate_ms"):
+        parse_scene(FULL.replace("[monitoring]\n", table.format(1e3 * MAX_ESCALATE + 1.0), 1))

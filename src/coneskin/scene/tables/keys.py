@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coneskin.core.keys import Key, with_meanings
-from coneskin.robot.driver.liveness import MAX_ESCALATE
 from coneskin.scene.values.scene import BODY_KINDS
 from coneskin.skin.sources.kinds import SOURCE_KINDS
 
@@ -185,7 +184,7 @@ MONITORING_KEYS = with_meanings(
     Key("clock_drift_ppm", float, None, low=1.0, high=50_000.0),
     Key("stuck_frames", int, None, low=0, high=1_000_000),
     Key("arm_silence_ms", float, None, low=4.0, high=1000.0),
-    Key("escalate_ms", float, None, low=4.0, high=1e3 * MAX_ESCALATE),
+    Key("escalate_ms", float, None, low=4.0, high=500.0),
     Key("standstill_rad_s", float, None, low=1e-4, high=0.1),
     Key("settle_ms", float, None, low=10.0, high=10_000.0),
     Key("program_silence_ms", float, None, low=60.0, high=5000.0),
