@@ -39,7 +39,7 @@ def _arguments(name: str, random: Random) -> list[str]:
 def test_odd_arguments_never_give_a_traceback(tmp_path_factory: pytest.TempPathFactory, name: str, seed: int) -> None:
     words = _arguments(name, Random(seed))
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as said:
-        patch.chdir(tmp_path_factory.getbasetemp())
+        patch.chdir(tmp_path_factory.mktemp("empty"))  # the runs of other tests are no odd arguments
         try:
             code = main(words)
         except SystemExit as exc:  # argparse's, with the usage
