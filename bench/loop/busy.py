@@ -57,7 +57,11 @@ class StallWatch(threading.Thread):
 
     def run(self) -> None:
         os.sched_setaffinity(0, {self._processor})
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90))
+        try:
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90))
+        except PermissionError:
+            print(f"no stall of processor {self._processor} is seen: start this as root", file=sys.stderr)
+            return
         last = time.monotonic()
         while True:
             time.sleep(0.001)

@@ -146,7 +146,6 @@ class Detector:
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
         reading_now: the newest valid frame while the sensor is touched, else None.
         timing: sequence and clocks, and counts of what was missing.
-        altered: how the untouched sheets are not what they were, so that no place is certain; empty while they are.
     """
 
     def __init__(self, sensor: Sensor, settings: DetectorSettings | None = None) -> None:
@@ -159,7 +158,6 @@ class Detector:
             )
         self.timing = FrameTiming(self.settings.timing)
         self.ready = False
-        self.altered = ""
         self.reading_now: TouchReading | None = None
         self._currents = UntouchedCurrents(sensor, self.settings.current_drift)
         self._guides = UntouchedGuides(self._currents)
@@ -184,6 +182,11 @@ class Detector:
     def touched(self) -> bool:
         """True while a touch lasts."""
         return self.reading_now is not None
+
+    @property
+    def altered(self) -> str:
+        """How the untouched sheets are not what they were, so that no place is certain; empty while they are."""
+        return self._places.altered
 
     def feed(self, frame: Frame, now: float, alarm: TouchAlarm | None = None) -> list[SkinEvent]:
         """Take the next frame of this sensor.
@@ -347,7 +350,7 @@ class Detector:
         changed = self._currents.feed(frame, self.timing.period)
         if changed is not None:
             if changed[0] is Fault.CURRENT_CHANGED:
-                self.altered = self._places.altered = changed[1]
+                self._places.altered = changed[1]
             self._report(events, changed[0], frame, now, changed[1])
         if self._quiet >= settings.settle_frames and self._currents.means[0]:
             self.ready = True
