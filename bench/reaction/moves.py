@@ -240,10 +240,11 @@ def run_baseline(host: str, mode: str, tool: list[float]) -> None:
         else:
             # the stop comes at any time between two targets, as it does under guard: the wheel sends it only when the
             # controller has taken the target before it
-            begin = CLOCK()
+            begin = due = CLOCK()
             while (now := CLOCK() - begin) < wait:
                 control.servoJ(servo_target(q, side, now), 0.0, 0.0, 0.002, 0.1, 300.0)
-                time.sleep(max(0.0, min(0.002 - (CLOCK() - begin - now), begin + wait - CLOCK())))
+                due += 0.002
+                time.sleep(max(0.0, min(due, begin + wait) - CLOCK()))
         if mode != "servoJ":
             time.sleep(wait)
         called = CLOCK()

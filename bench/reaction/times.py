@@ -5,7 +5,7 @@
 A simulated arm moves in one of the modes below; its virtual skin is touched at a random time; the guard stops it, and
 is reset. In turns with that, in the same run, the same arm moves in the same way without coneskin and is stopped by the
 bare call that the guard ends up making: ur_rtde's, or a program of one stopj on a socket that is open already. Both are
-timed by the same reader of the controller's state, and judged by the same rule (robot/stop/stop_monitor.py).
+timed by the clock in the controller's states, and judged by the same rule (robot/stop/stop_monitor.py).
 
     moveJ, moveL, speedJ, servoJ   through the guarded arm; moves are asynchronous on the wheel's side
     sync                           control = "external": a program of its own with ur_rtde's synchronous moveJ

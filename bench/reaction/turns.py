@@ -15,8 +15,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from bench.faults.setup import give_precedence
 from coneskin.core.errors import ConeSkinError
-from coneskin.robot.driver.values import StopPath
+from coneskin.robot.driver.values import ControllerState, StopPath
 from coneskin.robot.guard.signals.journal import BlockKind, decode_event
 from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -47,6 +48,7 @@ def guarded_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, An
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
+        give_precedence(simulated.pid)
         control = "external" if mode in EXTERNAL_MODES else "internal"
         text = forearm_scene(host, control, limits=TIME_LIMITS)
         if mode == "urcl":  # the library takes the slider, as the ROS driver does
@@ -99,7 +101,7 @@ def read_turn(mode: str, path: Path, touched: list[float], arrivals: list[float]
     """Return the times of each collision, from the recording."""
     run = read_run(path)
     states = [decode_state(b.time, b.payload) for b in run.blocks if b.kind == BlockKind.ARM]
-    samples = [(state.time, state.speed) for state in states]
+    samples = on_host_clock(states)
     commands = [
         b.time for b in run.blocks if b.kind == BlockKind.COMMAND and b.payload.startswith((b"driver\nS", b"program\n"))
     ]
@@ -128,13 +130,14 @@ def baseline_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, A
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         host, log = free_host(), folder / "log.jsonl"
         simulated = stack.enter_context(SimulatedController("UR5e", host, START, log=log))
+        give_precedence(simulated.pid)
         reader = stack.enter_context(StateReader(host))
         child = stack.enter_context(
             Child(sys.executable, "-m", MOVES_MODULE, "baseline", host, mode, json.dumps(simulated.state()["tcp"]))
         )
-        samples: list[tuple[float, float]] = []
+        states: list[ControllerState] = []
         over = threading.Event()
-        thread = threading.Thread(target=read_states, args=(reader, samples, over))
+        thread = threading.Thread(target=read_states, args=(reader, states, over))
         thread.start()
         stack.callback(thread.join)
         stack.callback(over.set)
@@ -144,16 +147,23 @@ def baseline_turn(mode: str, count: int, rng: random.Random) -> list[dict[str, A
             called += child.ask(json.dumps([side, wait, *q]))
             simulated.wait_for_standstill()
             time.sleep(0.05)
-        arrivals = came(mode, simulated)
+        arrivals, samples = came(mode, simulated), on_host_clock(states)
         return [follow(mode, "baseline", call, samples, arrivals, since=call) for call in called]
 
 
-def read_states(reader: StateReader, samples: list[tuple[float, float]], over: threading.Event) -> None:
+def read_states(reader: StateReader, states: list[ControllerState], over: threading.Event) -> None:
     while not over.is_set():
         select.select([reader], [], [], 0.1)
-        for payload in reader.read():
-            state = decode_state(CLOCK(), payload)
-            samples.append((state.time, state.speed))
+        states += [decode_state(CLOCK(), payload) for payload in reader.read()]
+
+
+def on_host_clock(states: list[ControllerState]) -> list[tuple[float, float]]:
+    """Return time [s] and speed of each state, by the controller's clock put to the host's.
+
+    A guard looks at states when its skin wakes it, another program at each: when one was read says nothing of the arm.
+    """
+    ahead = min(state.time - state.controller_time for state in states)
+    return [(state.controller_time + ahead, state.speed) for state in states]
 
 
 def follow(

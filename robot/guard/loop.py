@@ -98,6 +98,8 @@ class _Outbox:
         taken, now = self._send(output), self._clock()
         process = "driver" if self._ports.watchdog is None else "watchdog"
         self.sent.append(Block(BlockKind.COMMAND, now, encode_command(output, process, taken)))
+        if isinstance(output, StopProgram):
+            time.sleep(_HANDOVER_TIME)
 
     def _send(self, output: Command) -> bool:
         ports = self._ports
@@ -117,6 +119,8 @@ class _Outbox:
         return ports.slider is not None and ports.slider.set(output.fraction)
 
 
+#: s for which the guard leaves its processor after a stop: whom it has woken mostly waits for that one
+_HANDOVER_TIME = 5e-5
 _HEARTBEAT_BYTES = Heartbeat().encode()
 _SESSION_GONE_TIMEOUT = 0.8  # s that the arm has to stand when there is nobody left to tell; then watchdogs take over
 #: what can be lost -> the attribute of ``GuardPorts``; of what is not here, it has the same name
