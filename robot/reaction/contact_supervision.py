@@ -28,6 +28,7 @@ from coneskin.robot.arm.workspace import reach
 from .types import ContactOnLink
 
 _MIN_AWAY = 0.001  # m that the surface has moved away, as measured, from which on the level has to fall
+_MIN_BARE_AWAY = 0.0005  # m, likewise where a bare side may lead: a hard thing behind it gives 20 N within 1 mm
 _MAX_APPROACH = 0.001  # m that the surface may move towards the touch: noise of the encoders, and of the control
 _FALL_TIME = 0.05  # s in which the level has to fall by _MIN_FALL, again and again until the touch is light
 _MIN_FALL = 0.01  # of the level; six times its noise, and above 20 N what half the force is
@@ -62,10 +63,14 @@ class ContactSupervision:
         q: joint positions at its start [rad].
         contacts: touches at its start.
         complying: True for a compliant motion.
+        bare: True where a side that no skin covers may lead.
     """
 
-    def __init__(self, model: ArmModel, q: Joints, contacts: Sequence[ContactOnLink], complying: bool = False) -> None:
+    def __init__(
+        self, model: ArmModel, q: Joints, contacts: Sequence[ContactOnLink], complying: bool = False, bare: bool = False
+    ) -> None:
         self._model = model
+        self._min_away = _MIN_BARE_AWAY if bare else _MIN_AWAY
         self._complying = complying
         self._watched = {contact.number: self._watch(q, contact) for contact in contacts if contact.link}
 
@@ -116,7 +121,7 @@ class ContactSupervision:
             return f"the surface has moved {-1e3 * away:.1f} mm towards the touch"
         if watched.window is None:
             watched.lowest = level
-            if away >= _MIN_AWAY:
+            if away >= self._min_away:
                 watched.window, watched.level = time, level
             return ""
         watched.lowest = min(watched.lowest, level)

@@ -202,10 +202,11 @@ class MotionStream:
     ) -> None:
         self._motion, self._program, self._torque = motion, program, torque
         self.progress, self.how = 0.0, motion.how
-        self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push")
-        self._resistance = ResistanceMonitor(model, torque, self.how == "push")
         self._bare = None if reaction.bare_side == "fast" else bare
         self._allowed = reaction.bare_side == "allowed"  # a bare side may lead, slowly
+        leads = self._allowed and bare is not None
+        self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push", leads)
+        self._resistance = ResistanceMonitor(model, torque, self.how == "push")
         self._start, self._began = here.q, here.time
         self._sent = -math.inf
         self._braking: float | None = None  # how far the touched surface went on until this began [m]

@@ -51,9 +51,9 @@ def away(metres):
     return (brentq(missing, -0.1, 0.1), *Q[1:])
 
 
-def ended(*seen):
+def ended(*seen, bare=False):
     """The reason after the last of (time, way of the surface [m], touch)."""
-    supervision = ContactSupervision(arm_model("UR5e"), Q, [TOUCH])
+    supervision = ContactSupervision(arm_model("UR5e"), Q, [TOUCH], bare=bare)
     return [supervision.resistance(time, away(way), [contact]) for time, way, contact in seen][-1]
 
 
@@ -78,6 +78,12 @@ def test_each_limit_of_a_motion_away_is_where_its_words_say() -> None:
     slow, fast = level(TOUCH.level - 0.009), level(TOUCH.level - 0.011)
     assert ended(left, (0.03, 3e-3, slow), (0.06, 4e-3, slow)) == why
     assert ended(left, (0.03, 3e-3, fast), (0.06, 4e-3, fast)) == ""
+
+
+def test_where_a_bare_side_may_lead_the_touch_has_to_become_lighter_sooner() -> None:
+    way = (0.0, 0.6e-3, TOUCH), (0.051, 0.7e-3, TOUCH)
+    assert ended(*way) == ""
+    assert ended(*way, bare=True).startswith("the touch does not become lighter")
 
 
 @pytest.mark.parametrize(("degrees", "held"), [(59.0, False), (61.0, True)])
