@@ -96,7 +96,10 @@ def _dask(path: Path) -> Iterator[str]:
         return
     rates = []
     for workers in (1, 2):
-        with LocalCluster(workers, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        with (
+            LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster,
+            Client(cluster) as client,
+        ):
             client.gather(client.map(_once, [str(path)] * 2 * workers, pure=False))  # they import
             wall = time.perf_counter()
             times = client.gather(client.map(_once, [str(path)] * 4 * workers, pure=False))
