@@ -149,6 +149,17 @@ def test_collada_node_matrix_is_applied(tmp_path: Path) -> None:
     assert mesh.vertices[:, 1].min() == pytest.approx(-0.3, abs=1e-7)  # y is -z, not z
 
 
+def test_each_part_of_a_file_stands_where_its_node_says(tmp_path: Path) -> None:
+    path = write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Z_UP</up_axis>")
+    again = '<node id="m"><matrix>1 0 0 0.5 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_geometry url="#g"/></node>'
+    path.write_text(path.read_text().replace("</visual_scene>", f"{again}</visual_scene>"))
+    one, both = load_mesh(write_dae(tmp_path / "b.dae", TUBE, "<up_axis>Z_UP</up_axis>")), load_mesh(path)
+    assert len(both.faces) == 2 * len(one.faces)
+    edges = both.vertices[both.faces] - both.vertices[np.roll(both.faces, 1, axis=1)]
+    assert np.linalg.norm(edges, axis=2).max() < 0.4  # none from one part to the other, .5 m away
+    np.testing.assert_allclose(both.size, [0.6, 0.1, 0.3], atol=1e-7)
+
+
 def test_axes_are_kept_whatever_collada_calls_up(tmp_path: Path) -> None:
     mesh = load_mesh(write_dae(tmp_path / "a.dae", TUBE, "<up_axis>Y_UP</up_axis>"))
     np.testing.assert_allclose(mesh.size, [0.1, 0.1, 0.3], atol=1e-7)

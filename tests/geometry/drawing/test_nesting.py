@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from collections import Counter
 
 import pytest
@@ -67,6 +68,10 @@ def test_what_is_larger_than_the_bed_is_named() -> None:
         "7-upper-substrate, upper substrate: " in text and "does not fit on a bed of 300 x 200 mm" in text
         for text in larger
     )
+    sizes = [tuple(map(int, re.findall(r": (\d+) x (\d+) mm", text)[0])) for text in larger]
+    widest = max(x1 - x0 for x0, _, x1, _ in (box(part) for sheet in CONE for part in sheet.parts))
+    assert max(map(max, sizes)) <= 1e3 * widest + 5.0 < 500.0
+    assert all(max(size) > 300 or min(size) > 200 for size in sizes)
     named = sum(len(sheet.parts) for one in beds for sheet in one.sheets) + len(larger)
     assert named == sum(len(sheet.parts) for sheet in CONE)
     with pytest.raises(GeometryError, match=r"a bed is from 50 to 10000 mm wide and deep.* got 1e-09 x 200 mm"):
