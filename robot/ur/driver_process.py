@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
-from coneskin.core.child_process import first_message, inherit, shorten_time_slice, take_precedence
+from coneskin.core.child_process import first_message, inherit, shorten_time_slice
 from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
@@ -338,7 +338,6 @@ def main(arguments: list[str]) -> int:
     lifeline, (guard, program) = inherit(arguments, parent=1)
     if (settings := first_message(program)) is None:
         return 1
-    take_precedence()  # as the guard does: a stop must not wait until that has done what follows its command
     try:
         with Deadman(guard, program) as deadman, UrArm(settings["host"], settings["watchdog_hz"]) as arm:
             driver = DriverProcess(

@@ -62,11 +62,3 @@ def test_on_a_machine_whose_calls_are_not_known_nothing_is_called(monkeypatch: p
     monkeypatch.setattr(child_process, "_CALL_NUMBERS", {})
     monkeypatch.setattr("ctypes.CDLL", None)
     shorten_time_slice()
-
-
-@pytest.mark.skipif(sys.platform == "win32" or os.geteuid() != 0, reason="only root may lower nice values")
-def test_precedence_holds_for_the_process_and_its_later_threads() -> None:
-    program = "import os, threading\nfrom coneskin.core.child_process import take_precedence\ntake_precedence()\n"
-    program += "thread = threading.Thread(target=lambda: print(os.nice(0)))\nthread.start()\nthread.join()\n"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
-    assert done.stdout == "-15\n"

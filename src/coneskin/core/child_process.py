@@ -22,7 +22,6 @@ import struct
 import sys
 import threading
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .channel import Channel, decode_json, wait_readable
@@ -188,22 +187,12 @@ def first_message(channel: Channel) -> dict[str, Any] | None:
     return decode_json(hello[0]) if hello and hello[0] != b"quit" else None
 
 
-_NICE_VALUE = -15  # nice value; more would be in the way of the kernel's own threads
-_AUTOGROUP_FILE = Path("/proc/self/autogroup")  # of sched(7): nice values only count among the processes of one session
 _MIN_SLICE = 100_000  # ns that Linux takes
 _ORDINARY_POLICY = 0  # policy of ordinary processes
 #: sched_attr: size, policy, flags, nice, priority, runtime, deadline, period; times in ns
 _SCHED_ATTRIBUTES = struct.Struct("<IIQiIQQQ")
 #: machine -> numbers of the calls sched_getattr and sched_setattr, which Python does not have
 _CALL_NUMBERS = {"x86_64": (315, 314), "aarch64": (275, 274), "riscv64": (275, 274)}
-
-
-def take_precedence() -> None:
-    """Run before ordinary processes; root may, and whom the user's limits let. Else all is as it was."""
-    with contextlib.suppress(OSError):
-        os.nice(_NICE_VALUE)
-        if os.getsid(0) == os.getpid():  # Linux may first divide its time among sessions; this one is our own
-            _AUTOGROUP_FILE.write_text(str(_NICE_VALUE))
 
 
 def shorten_time_slice() -> None:
