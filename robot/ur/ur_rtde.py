@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from enum import Enum
 from typing import Any
 
-from coneskin.core.errors import MissingExtra, RobotConnectionError, RobotRefused
+from coneskin.core.errors import ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
 
 _START_TIMEOUT = 2.0  # s for the control program to start; ur_rtde itself allows 5
@@ -40,6 +40,8 @@ def _rtde_errors(doing: str) -> Iterator[None]:
     try:
         yield
     except RuntimeError as exc:
+        if isinstance(exc, ConeSkinError):
+            raise
         why = "another program controls the arm, a second coneskin perhaps" if "already in use" in str(exc) else exc
         raise RobotConnectionError(f"{doing}: {why}") from exc
 
@@ -272,11 +274,18 @@ class UrArm:
         return self.waypoint() is not None
 
     def waypoint(self) -> int | None:
-        """Return the number of the way point to which a move goes, from 0; None where no move runs."""
+        """Return the number of the way point to which a move goes, from 0; None where no move runs.
+
+        Raises:
+            RobotRefused: the program on the controller has ended, so the arm has not arrived.
+        """
         if self.mode is not Mode.MOVE:
             return None
         with _rtde_errors("asking for progress"):
             status = self.control.getAsyncOperationProgressEx()
+            if not self.control.isProgramRunning():
+                self.mode = Mode.IDLE
+                raise RobotRefused(f"the program on the controller {self.host} has ended before the arm arrived")
             if status.isAsyncOperationRunning():
                 return int(status.progress())
         self.mode = Mode.IDLE

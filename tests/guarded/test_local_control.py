@@ -75,7 +75,7 @@ def test_a_servoj_that_no_slider_stops_is_ended_by_the_controllers_watchdog():
         SimulatedController(model="UR5e", host=free_host(), start_q=START) as controller,
         guard(scene_for(controller, control="external")) as session,
     ):
-        lines = "".join(f"  {line}\n" for line in heartbeat_lines(10.0).splitlines())
+        lines = "".join(f"  {line}\n" for line in heartbeat_lines(1.0).splitlines())
         send(controller.host, 30002, f"def users():\n{lines}{SERVO}")
         until(lambda: max(map(abs, controller.state()["qd"])) > 0.3)
         controller.call("local control")

@@ -53,6 +53,18 @@ def test_the_end_of_a_move_is_told(driver):
     assert answers(program) == [{"number": 1, "ok": True}]
 
 
+def test_a_move_whose_program_something_else_has_ended_is_not_told_to_have_arrived(driver):
+    served, made, guard, program = driver
+    guard.send(Release(7).encode())
+    move(program)
+    served.poll(0.0)
+    made.control.running = made.control.playing = False
+    served.poll(0.0)
+    (answer,) = answers(program)
+    assert (answer["ok"], answer["stopped"]) == (False, True)
+    assert "has ended before the arm arrived" in answer["why"]
+
+
 def test_a_retreat_and_its_halt(driver):
     served, made, guard, _ = driver
     guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0).encode())
