@@ -172,6 +172,8 @@ def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
     for corner in data["electrodes"]["A"]:
         x, y = surface.flat_point(1e-3 * corner["u_mm"], math.radians(corner["phi_deg"]) - 0.5 * surface.wrap)
         assert (corner["x_mm"], corner["y_mm"]) == pytest.approx((1e3 * x, 1e3 * y), abs=2e-3)
+        millimetres = [value for name, value in corner.items() if name.endswith("_mm")]
+        assert millimetres == [float(f"{value:.3f}") for value in millimetres], "in thousandths"
     assert any("tab_width_mm" in corner for corner in data["electrodes"]["C"])
     assert data["untouched_frame"]["radial_current"] > 100
     for cut in design.cuts:
