@@ -412,3 +412,5 @@ def test_an_end_at_the_links_own_end_is_told_for_a_tilted_sheet_too() -> None:
         text = guide(design, replace(figures, placement=place))
         assert ("| line of end 1 | 2.0 mm along the axis" in text) == (before < 0.01)
         assert ("| line of end 2 | outermost place" in text) == (beyond < 0.01)
+        assert "Nothing stands out from the link by which edge 0 could be found" in text
+        assert "The link is not round" not in text, "a round one has no bend to lay a marked strip of paper by"
