@@ -23,6 +23,7 @@ from coneskin.design import folder as design_folder
 from coneskin.design import link_design
 from coneskin.design.link_design import LinkMesh
 from coneskin.geometry.fit.cones import LinkFit
+from coneskin.geometry.frustum import Frustum
 
 CYLINDER = ["--radius1-mm", "54", "--height-mm", "200"]
 Triangle = tuple[tuple[float, float, float], ...]
@@ -174,6 +175,42 @@ def test_no_share_is_said_that_prints_as_none(
     for holes in (1, 3):
         assert design(str(tmp_path / "tube.stl"), "-o", str(tmp_path / f"out{holes}")) == 0
         assert ("spans holes" in capsys.readouterr().out) == (holes == 3)
+
+
+@pytest.mark.parametrize(
+    ("facets", "bridged", "said"),
+    [
+        (0.0, 0.0, ""),
+        (3e-5, 0.0, ", of which the facets of the mesh are up to 0.030 mm"),
+        (0.0, 0.012, ", but 1.2% of it spans holes and grooves, down to 1.50 mm"),
+    ],
+)
+def test_a_deviation_is_said_with_what_is_no_mistake_of_the_fit(
+    facets: float, bridged: float, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = link_design.design_link(Frustum(0.05, 0.05, 0.1, 2.0))
+    fit = SimpleNamespace(
+        max_deviation=1e-4, rms_deviation=5e-5, facet_height=facets, bridged_share=bridged, bridged_depth=1.5e-3
+    )
+    command._print(replace(found, sheets=(replace(found.sheets[0], fit=fit),)))  # type: ignore[arg-type]
+    line = capsys.readouterr().out.splitlines()[0]
+    assert line.partition(", deviation ")[2] == f"0.100 mm at most, 0.050 mm rms{said}"
+
+
+@pytest.mark.parametrize(
+    ("name", "last", "link"),
+    [
+        ("forearm_link", "next: coneskin init out --simulated --arm UR5e, for your model of arm", False),
+        ("handle", "next: coneskin init out --simulated --skin-only, which reports touches", True),
+    ],
+)
+def test_a_mesh_that_is_named_as_a_link_of_an_arm_needs_no_name_any_more(
+    name: str, last: str, link: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command._print_next(SimpleNamespace(name=name, mesh=object(), sheets=[None]), Path("out"))  # type: ignore[arg-type]
+    said = capsys.readouterr().out
+    assert said.splitlines()[-1] == last
+    assert (" --link LINK, with LINK one of base, " in said) is link
 
 
 @pytest.mark.parametrize(("value", "text"), [(0.00412, "0.0041"), (0.0996, "0.10"), (0.5, "0.50"), (12.3, "12")])

@@ -1,12 +1,14 @@
-"""The next command that is printed is one that a shell takes."""
+"""The next command that is printed is one that a shell takes, and a page ends as its options say."""
 
 from __future__ import annotations
 
+import argparse
 import io
 import json
 import os
 import shlex
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,7 +16,7 @@ import pytest
 
 from coneskin.cli import main
 from coneskin.commands.demo import _collision_facts, _print_report
-from coneskin.commands.terminal import print_hint, print_line
+from coneskin.commands.terminal import add_page_options, print_hint, print_line, show_page
 from coneskin.runs.replay.run import Run
 from coneskin.scene.reader import parse_scene
 
@@ -51,6 +53,23 @@ def test_a_line_is_written_in_one_piece(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(sys, "stdout", SimpleNamespace(write=written.append, flush=lambda: None))
     print_line("5.6052 s  stop: touch")
     assert written == ["5.6052 s  stop: touch\n"]
+
+
+@pytest.mark.parametrize(("words", "ends"), [([], []), (["--duration-s", "2"], [2.0])])
+def test_a_page_ends_after_its_time_and_without_one_not_by_itself(
+    words: list[str], ends: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    timers: list[tuple[float, Callable[[], None]]] = []
+    monkeypatch.setattr("threading.Timer", lambda *what: SimpleNamespace(start=lambda: timers.append(what)))
+    monkeypatch.setattr("signal.signal", lambda *_: None)
+    parser = argparse.ArgumentParser()
+    add_page_options(parser, 8080)
+    over = show_page(parser.parse_args([*words, "--no-browser"]), "http://localhost:8080", "it is at {}")
+    assert [seconds for seconds, _ in timers] == ends
+    assert not over.is_set()
+    for _, end in timers:
+        end()
+    assert over.is_set() is bool(ends)
 
 
 def test_a_guard_ends_with_the_replay_of_what_it_has_recorded(

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
-from coneskin.commands.replay import _exit_code
+from coneskin.commands.replay import _exit_code, _report
+from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+from coneskin.runs.replay.run import Replay
 from tests.support.paths import COLLISION
 
 
@@ -76,6 +78,23 @@ def test_a_folder_of_runs_is_listed_and_several_runs_are_summed_up(
 def test_a_run_that_only_lacks_something_is_told_from_one_that_differs(changes: dict[str, object], code: int) -> None:
     row = {"error": "", "same": False, "first_difference": "", "diverged_s": None, "complete": False, **changes}
     assert _exit_code([row], compared=True, incomplete_too=False) == code
+
+
+@pytest.mark.parametrize(
+    ("compared", "differences", "missing", "verdict"),
+    [
+        (0, [], "its end", "INCOMPLETE: no event that could be compared was recorded"),
+        (1, [], "its end", "INCOMPLETE: 1 event up to what is missing are the same, bit by bit; 2 events behind "),
+        (0, ["is new"], "", "the events are NOT the same:"),
+        (3, [], "", "the events are the same, bit by bit"),
+    ],
+)
+def test_a_replay_says_how_far_its_run_was_compared(
+    compared: int, differences: list[str], missing: str, verdict: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded = [GuardEvent(EventName.ACTIVATED, float(k), {}) for k in range(3)]
+    _report(Replay([], recorded, compared, differences, 0, 3.0, missing), 0.0, False)
+    assert f"\n{verdict}" in capsys.readouterr().out
 
 
 def test_a_variant_that_cannot_be_is_named_with_its_reason(capsys: pytest.CaptureFixture[str]) -> None:

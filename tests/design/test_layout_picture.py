@@ -6,9 +6,10 @@ import re
 
 import pytest
 
-from coneskin.design.sheet_pictures import draw_layout, draw_parts, draw_seam
+from coneskin.design.sheet_pictures import _dimensions, draw_layout, draw_parts, draw_seam
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.workshop.build_figures import _sheet_wires
+from coneskin.geometry.drawing.surface_shape import draw_shape
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
@@ -55,6 +56,19 @@ def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str,
     assert crossing == (wrap_deg > 200.0)
     rim = [y for line in axes.lines[:1] for y in line.get_ydata()]
     assert cy < min(rim) if wires == "end1" else cy > min(rim)
+
+
+def test_the_width_is_written_just_below_a_sheet_whose_sector_reaches_far_down() -> None:
+    """Of 276 deg: its corners lie 215 mm below the middle of end 1, where the tabs are."""
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    (design,) = design_sheets((PlacedFrustum(Frustum(0.05, 0.15, 0.085)),), DesignOptions(wires="end1"))
+    axes, cone = module.Figure().add_subplot(), design.cuts[4].surface
+    x0, y0, x1, y1 = (1e3 * value for value in draw_shape(cone, design.layout.rim).bounds)
+    _dimensions(axes, design, cone, [0.0])
+    (written,) = [text for text in axes.texts if text.get_text() == f"{x1 - x0:.2f} mm"]
+    x, y = written.get_position()
+    assert x == pytest.approx(0.5 * (x0 + x1))
+    assert y0 - 0.15 * (y1 - y0) < y < y0 - 1e3 * design.layout.plan.tab
 
 
 def test_a_cable_that_passes_edge_0_is_drawn_as_one_line() -> None:

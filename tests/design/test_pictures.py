@@ -1,10 +1,14 @@
 """Pictures in space: what is nearer hides what is behind it, and each place has its own colour."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from coneskin.design import pictures
 from coneskin.design.link_picture import _name_ends, _reasons, _View, draw_link, draw_weights
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.fit.bare_areas import BareArea
@@ -54,6 +58,21 @@ def test_a_sheet_hides_the_link_under_it_and_bare_ends_have_the_colours_of_their
         assert low == pytest.approx(0.23, abs=0.08)
         assert high == pytest.approx(0.23, abs=0.08)
     assert [line.get_label() for line in figure.axes[-1].lines][-2:] == ["bare, 25%: low", "bare, 25%: high"]
+
+
+@pytest.mark.parametrize("fitted", [False, True])
+def test_a_report_shows_deviations_and_bare_areas_where_there_are_any(
+    fitted: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A strip over the seam of a sheet lies on that sheet: the mesh below it is no deviation of a fit."""
+    monkeypatch.setattr(pictures, "_draw_file", lambda *_: None)
+    (sheet,) = design_sheets([PlacedFrustum(Frustum(RADIUS, RADIUS, 0.1, 2.0))], DesignOptions())
+    designs = (sheet, replace(sheet, name="strip", above=sheet.name))
+    figure = SimpleNamespace(placement=SimpleNamespace(faces=()), wires=(), collars=())
+    mesh, bare = (tube(), [BareArea("flat", 0.1, np.zeros((1, 3)))]) if fitted else (None, [])
+    drawn = pictures.draw_pictures(tmp_path, designs, [figure] * 2, mesh, 1e-3, lambda _: None, bare)  # type: ignore
+    assert [path for _, path in drawn if "deviation" in path] == ["pictures/sheet-1-deviation.png"] * fitted
+    assert ("tinted by its reason" in drawn[0][0]) is fitted
 
 
 @pytest.mark.parametrize("way", [(0.8, 0.3, 0.4), (-0.8, -0.3, 0.4), (0.9, 0.1, -0.2)])

@@ -167,6 +167,9 @@ def test_what_both_say_once_of_the_arm_is_one_thing_at_any_time_and_what_comes_t
     one, other = told((stands, 1.0), (stands, 2.0), (latched, 3.0)), told((stands, 1.1), (latched, 5.0))
     found = [str(difference) for difference in compare_decisions(one, other).differences]
     assert found == ["standstill 1: 100.0 ms later", "standstill 2: missing", "latched: 2000.0 ms later"]
+    one, other = told((stands, 1.0)), told((stands, 0.9), (stands, 1.02), (stands, 3.0))
+    found = [str(difference) for difference in compare_decisions(one, other).differences]
+    assert found == ["standstill 1: new", "standstill 2: 20.0 ms later", "standstill 3: new"], "the nearest pair"
 
 
 def test_a_run_that_has_lost_something_is_compared_up_to_there_and_is_not_the_same(again: Decisions) -> None:

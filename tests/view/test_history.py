@@ -167,3 +167,7 @@ def test_two_runs_are_laid_side_by_side_by_their_first_touch() -> None:
     first, second = read_courses([RUN, RUN])
     assert first.offset[1] == -second.offset[1] != 0.0
     assert event(first, EventName.CONTACT).time == first.zero
+    assert [name for name, *_ in _plots([first, second])["touch level"]] == [
+        "run 1: forearm skin",
+        "run 2: forearm skin",
+    ]

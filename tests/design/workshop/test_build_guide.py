@@ -172,6 +172,8 @@ def test_coordinates_of_the_file_are_those_of_the_drawing() -> None:
     for corner in data["electrodes"]["A"]:
         x, y = surface.flat_point(1e-3 * corner["u_mm"], math.radians(corner["phi_deg"]) - 0.5 * surface.wrap)
         assert (corner["x_mm"], corner["y_mm"]) == pytest.approx((1e3 * x, 1e3 * y), abs=2e-3)
+        millimetres = [value for name, value in corner.items() if name.endswith("_mm")]
+        assert millimetres == [float(f"{value:.3f}") for value in millimetres], "in thousandths"
     assert any("tab_width_mm" in corner for corner in data["electrodes"]["C"])
     assert data["untouched_frame"]["radial_current"] > 100
     for cut in design.cuts:
@@ -410,3 +412,5 @@ def test_an_end_at_the_links_own_end_is_told_for_a_tilted_sheet_too() -> None:
         text = guide(design, replace(figures, placement=place))
         assert ("| line of end 1 | 2.0 mm along the axis" in text) == (before < 0.01)
         assert ("| line of end 2 | outermost place" in text) == (beyond < 0.01)
+        assert "Nothing stands out from the link by which edge 0 could be found" in text
+        assert "The link is not round" not in text, "a round one has no bend to lay a marked strip of paper by"

@@ -98,6 +98,16 @@ def test_labels_lie_inside_clear_of_every_line_and_of_each_other(name, side):
                 assert distance(a, b) > 0.3e-3, (part.labels[i].text, part.labels[j].text)
 
 
+def test_the_name_of_a_narrow_electrode_leaves_a_fifth_of_its_foil_free_above_and_below():
+    """A name that fills its strip is cut off where the cutter is a little aside."""
+    width = 4e-3
+    layout = lay_out_sheet(SHEETS["cylinder"], ElectrodePlan(electrode=width))
+    foils = [part for sheet in cut_sheets(layout, PAPER_STACK)[1::4] for part in sheet.parts]
+    assert [label.text[:1] for foil in foils for label in foil.labels] == [*"CDAB"]
+    for foil in foils:
+        assert all(0.5 * (width - label.height) >= 0.2 * width - 1e-9 for label in foil.labels), foil.name
+
+
 @pytest.mark.parametrize(
     ("name", "side"),
     sweep(

@@ -13,7 +13,7 @@ from coneskin.geometry.drawing.dxf import to_dxf
 from coneskin.geometry.drawing.electrode_layout import lay_out_sheet
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.drawing.outline import Outline
-from coneskin.geometry.drawing.pdf import _tile_pages, to_pdf
+from coneskin.geometry.drawing.pdf import _scale_bar, _tile_pages, to_pdf
 from coneskin.geometry.frustum import Frustum
 from tests.support.sweep import sweep
 
@@ -158,6 +158,13 @@ def test_scale_bar_of_a_rendered_page_measures_100_mm(page, tmp_path):
         ticks = dark_columns(row[: round(120 * per_mm)])
         assert len(ticks) == 3
         assert (ticks[2] - ticks[0]) / per_mm == pytest.approx(100.0, abs=1.5 / per_mm)  # a pixel and a half
+
+
+def test_the_scale_bar_has_a_tick_each_10_mm_and_none_beyond_its_end():
+    drawn = [[float(word) for word in re.findall(r"[\d.]+", line)] for line in _scale_bar(15.0, 8.0) if line[-1] == "S"]
+    bar, *ticks = drawn
+    assert bar == [15.0, 8.0, 115.0, 8.0]
+    assert [tick[0] for tick in ticks] == [tick[2] for tick in ticks] == [*range(15, 116, 10)]
 
 
 def test_a_rendered_square_has_its_size(tmp_path):

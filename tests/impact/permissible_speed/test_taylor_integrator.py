@@ -157,6 +157,21 @@ def test_a_held_body_is_pressed_at_rest_as_springs_in_series_say() -> None:
     assert course.last == pytest.approx(soft * course.stopping_distance, rel=1e-9)
 
 
+@pytest.mark.parametrize(("speed", "bottomed_out"), [(0.1, False), (0.3, True)])
+def test_a_contact_that_has_come_to_rest_is_not_integrated_any_more(speed: float, bottomed_out: bool) -> None:
+    """Its last stretch is the balance of the springs of padding and servos, by hand."""
+    padding = Padding(thickness=2e-3, stiffness=10e3, hard_stiffness=1e6, loss=1.0)
+    course = taylor_integrator.integrate(
+        TwoMassContact(DrivenArm(speed, 8.0, 40e3, 400.0, 0.012, 5.0), WALL, padding), 2.0
+    )
+    soft = course.stopping_distance / (1 / 10e3 + 1 / 40e3)
+    hard = (course.stopping_distance - 2e-3 + 20.0 / 1e6) / (1 / 1e6 + 1 / 40e3)  # 20 N at 2 mm
+    last = course.stretches[-1]
+    assert last.force == (pytest.approx(hard if bottomed_out else soft, rel=1e-12),)
+    assert last.start < 1.1
+    assert last.start + last.duration == pytest.approx(2.0)
+
+
 @pytest.mark.parametrize("speed", [0.0, 1e-6, 5.0])
 @pytest.mark.parametrize("body", [1e-3, 1e3])
 @pytest.mark.parametrize("arm", [1e-3, 1e3, math.inf])

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import RecordingError
+from coneskin.robot.arm.models import arm_model
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.export.export import export_run
+from coneskin.runs.export.mcap_file import _drawn_arm
 from coneskin.runs.export.tables import Table, table_pieces
 from coneskin.runs.replay.run import Run
 from coneskin.skin.wire import DrivenPotentials, FrameDecoder, encode
@@ -153,6 +155,16 @@ def test_mcap_is_read_back_equal_and_fits_its_schemas(collision: Run, tables: di
     place = entity["spheres"][0]["pose"]["position"]
     assert math.dist((0, 0, 0.16), (place["x"], place["y"], place["z"])) < 1.3  # within the reach of the arm
     assert len(topics["/drawing/arm"]) > 50
+
+
+def test_the_arm_is_drawn_fifty_times_a_second_at_most(collision: Run) -> None:
+    """It is recorded 500 times a second, and a file with each drawing would be ten times as large."""
+    times = [state.time for state in collision.states()]
+    drawn = [message.time for message in _drawn_arm(collision, arm_model("UR5e"), (), 0.0)]
+    assert drawn[0] == times[0]
+    apart = np.diff(drawn)
+    assert apart.min() >= 0.02
+    assert apart.max() <= 0.02 + np.diff(times).max(), "with the next state that is due"
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "npz", "mcap"])

@@ -6,8 +6,8 @@ from coneskin.cli import main
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
 from coneskin.core.recording.reader import read_recording
 from coneskin.core.recording.recorder import Recorder
-from coneskin.robot.guard.signals.journal import BlockKind, RecordingOverflowFilter
-from coneskin.runs.replay.run import Verdict, read_run
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, RecordingOverflowFilter
+from coneskin.runs.replay.run import Run, Verdict, _left_out, read_run
 from tests.support.sweep import sweep
 
 from ...scene.scenes import record
@@ -51,6 +51,13 @@ def test_a_difference_before_the_gap_is_found(tmp_path):
         recorder.write(*(block for block in blocks if not (block.kind == BlockKind.ARM and block.time < 1000.4)))
     assert read_run(tmp_path / "other.rec").replay().differences
     assert not read_run(tmp_path / "cut.rec").replay().differences
+
+
+@pytest.mark.parametrize(("told", "known"), [({"blocks": 7}, 7), ({}, 0), ({"blocks": "many"}, 0)])
+def test_no_block_counts_as_missing_that_the_guard_has_not_counted(told, known):
+    details = {"since": 1.0, "until": 2.0, "what": "frames", **told}
+    run = Run({}, [GuardEvent(EventName.RECORDING_GAP, 2.0, details).block()])
+    assert [defect.blocks for defect in _left_out(run.events)] == [known]
 
 
 def test_a_whole_recording_lacks_nothing(tmp_path):

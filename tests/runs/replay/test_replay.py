@@ -58,6 +58,16 @@ def test_the_same_events_bit_by_bit(run: Run) -> None:
     assert result.duration == pytest.approx(1.5, abs=0.01)
 
 
+def test_the_picture_for_a_notebook_reaches_from_its_left_edge_to_its_right_one(run: Run) -> None:
+    page = run._repr_html_()
+    (width,), (points,) = re.findall(r"viewBox='0 0 (\d+) ", page), re.findall(r"points='(.*?)'", page)
+    across = [float(point.partition(",")[0]) for point in points.split()]
+    assert (across[0], across[-1]) == pytest.approx((0.0, float(width)), abs=0.01 * float(width))
+    assert across == sorted(across)
+    (touch,) = re.findall(r"<path d='M([\d.]+) ", page)
+    assert float(touch) / float(width) == pytest.approx(0.6 / 1.5, abs=0.02), "0.6 s after the begin of 1.5 s"
+
+
 def test_one_bit_of_an_event_is_seen(run: Run) -> None:
     where = next(i for i, block in enumerate(run.blocks) if block.payload.startswith(b'["contact"'))
     blocks = list(run.blocks)

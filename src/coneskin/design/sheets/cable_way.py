@@ -129,10 +129,10 @@ class TabApron:
     feet: Floats
     tips: Ints
     way_out: Floats
-    slope: float = 0.0
+    slope: float
 
     @classmethod
-    def of(cls, place: PlacedFrustum, layout: SheetLayout, height: float, slope: float = 0.0) -> TabApron:
+    def of(cls, place: PlacedFrustum, layout: SheetLayout, height: float, slope: float) -> TabApron:
         """Return the strip of a sheet whose tabs leave at a height [m] above the link."""
         side, plan, sheet = layout.plan.wires, layout.plan, layout.sheet
         roots = [tab_foot(layout, name) for name in "ABCD"]
