@@ -16,6 +16,7 @@ from coneskin.scene.build import build_core
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.session.skin_process import virtual_skin
+from coneskin.skin.wire import FRAME_LENGTHS
 
 from .scenes import FULL, SERIAL_RETREAT, SKIN_ONLY
 
@@ -53,6 +54,13 @@ def test_what_a_file_leaves_out_is_none() -> None:
     scene = parse_scene(SKIN_ONLY)
     assert (scene.arm, scene.reaction, scene.monitoring, scene.recording, scene.motion) == (None,) * 5
     assert parse_scene("") == Scene("scene", "", Path())
+
+
+@pytest.mark.parametrize("length", FRAME_LENGTHS)
+def test_a_virtual_skin_sends_frames_of_any_length_that_there_is(length: int) -> None:
+    scene = parse_scene(with_changes(FULL, ("[source]", f'[source]\nmodel = "ladder"\nframe_length = {length}')))
+    _, frame = next(virtual_skin(scene).packets())
+    assert len(frame) == length
 
 
 def with_changes(text: str, *changes: tuple[str, str]) -> str:

@@ -101,6 +101,16 @@ def test_where_nothing_is_known_nothing_is_planned(change: dict[str, object], wo
     assert words in plan.reason
 
 
+@pytest.mark.parametrize("length", [0.991, 1.009])
+def test_a_normal_that_is_not_quite_a_unit_is_made_one(length: float) -> None:
+    exact, scaled = (
+        planned(UR10E, Q, [replace(FOREARM, normal=(0.36 * size, 0.48 * size, 0.8 * size))]) for size in (1.0, length)
+    )
+    assert isinstance(exact, RetreatPlan)
+    assert isinstance(scaled, RetreatPlan)
+    assert scaled.tracks[0].away == pytest.approx(exact.tracks[0].away, abs=1e-12)
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_an_arm_that_reports_nonsense_is_not_moved(bad: float) -> None:
     plan = planned(UR10E, Q, [FOREARM])

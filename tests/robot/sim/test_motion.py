@@ -151,17 +151,18 @@ def test_the_slider_scales_speed_and_a_stop_does_not_wait_for_it() -> None:
 
 
 @pytest.mark.parametrize("joint", range(6))
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, sign: float) -> None:
-    arm = SimulatedArm(ARM, HOME)
-    speeds = [0.0] * 6
-    speeds[joint] = sign * 1.5
+@pytest.mark.parametrize("speed", [1.5, -1.5, 0.4, -0.4])
+def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, speed: float) -> None:
+    sign = math.copysign(1.0, speed)
+    limit = (ARM.joint_upper if sign > 0 else ARM.joint_lower)[joint]
+    start, speeds = list(HOME), [0.0] * 6
+    start[joint], speeds[joint] = limit - 0.5 * sign, speed
+    arm = SimulatedArm(ARM, start)
     arm.motion = SpeedJoints(speeds, 5.0)
-    faults = [fault for _ in range(6000) if (fault := arm.update(1.0, False))]
+    faults = [fault for _ in range(1000) if (fault := arm.update(1.0, False))]
     assert faults == [fault for fault in faults if f"joint {joint + 1}" in str(fault)]
     assert [str(fault.cause) for fault in faults] == ["C150A0"]
     assert not arm.moving
-    limit = (ARM.joint_upper if sign > 0 else ARM.joint_lower)[joint]
     assert 0.0 <= sign * (limit - arm.q[joint]) < 0.01  # within one cycle's way of the limit
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import socket
 
 import pytest
@@ -133,6 +134,27 @@ def test_a_cut_network_drops_packets_both_ways_and_closes_nothing() -> None:
             assert new.recv(100).startswith(b"Connected")
         script.close()
         rtde.close()
+
+
+def test_a_motor_is_counted_from_1_and_there_are_six() -> None:
+    faults = Server(Controller(Options()), free_host()).faults
+    assert json.loads(faults.answer("resist 2 3.5")) == {"result": [0.0, 3.5, 0.0, 0.0, 0.0, 0.0]}
+    assert json.loads(faults.answer("resist 6 -1")) == {"result": [0.0, 3.5, 0.0, 0.0, 0.0, -1.0]}
+    for number in (0, 7):
+        assert "unknown fault" in json.loads(faults.answer(f"resist {number} 1"))["error"]
+
+
+def test_a_silent_dashboard_takes_commands_and_says_nothing() -> None:
+    with Server(Controller(Options()), free_host()) as server, socket.socket() as client:
+        server.faults.answer("dashboard silent")
+        client.connect((server.host, PORTS["dashboard"]))
+        server._poll(1.0)
+        client.sendall(b"robotmode\n")
+        server._poll(1.0)
+        server.faults.answer("dashboard normal")
+        client.sendall(b"quit\n")
+        server._poll(1.0)
+        assert client.makefile("rb").read() == b"Disconnected\n"  # no greeting, and no mode
 
 
 def read_some(sock: socket.socket, server: Server, cycles: int) -> bytes:

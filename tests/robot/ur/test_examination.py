@@ -13,7 +13,7 @@ from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import ExaminationScope
 from coneskin.robot.sim.process import free_host
 from coneskin.robot.ur import examination
-from coneskin.robot.ur.examination import _braking, examine
+from coneskin.robot.ur.examination import _braking, _state, examine
 from coneskin.robot.ur.rtde_connection import RtdeConnection
 from tests.support.served_controller import served
 
@@ -37,6 +37,37 @@ def test_an_old_controller_that_tells_no_payload_is_taken_to_carry_none(monkeypa
     monkeypatch.setattr(examination, "RtdeConnection", lambda *_: nullcontext(old))
     (found,) = _braking(arm_model("UR5e"), "nowhere", 10.0)
     assert (found.verdict, found.value[:35]) == ("ok", "stretched out with 0 kg, its motors")
+
+
+@pytest.mark.parametrize(
+    ("steps", "verdict"),
+    [
+        ([0.0024] * 40, "ok"),  # a fifth more than the cycle
+        ([0.002] * 39 + [0.02], "ok"),
+        ([0.003] * 40, "warning"),
+        ([0.002] * 39 + [0.03], "warning"),
+    ],
+)
+def test_states_that_come_late_or_with_a_gap_are_a_warning(
+    monkeypatch: pytest.MonkeyPatch, steps: list[float], verdict: str
+) -> None:
+    now, left = [100.0], iter(steps)
+
+    def read() -> list[bytes]:
+        step = next(left, None)
+        now[0] += step or 9.0
+        return [] if step is None else [b""]
+
+    state = SimpleNamespace(powered=True, stopped_by_safety=False)
+    reader = SimpleNamespace(wait=lambda _: state, read=read)
+    for name, value in {
+        "StateReader": lambda *_: nullcontext(reader),
+        "wait_readable": lambda *_: None,
+        "decode_state": lambda time, _: SimpleNamespace(time=time, **vars(state)),
+        "time": SimpleNamespace(monotonic=lambda: now[0]),
+    }.items():
+        monkeypatch.setattr(examination, name, value)
+    assert verdicts(list(_state("nowhere", 0.002))) == {"power": "ok", "safety": "ok", "latency": verdict}
 
 
 @pytest.mark.long

@@ -1,15 +1,15 @@
 """Variables and outputs for the guarded program, against the simulated controller in a process of its own."""
 
+import struct
 import time
 
 import pytest
 
 from coneskin.core.errors import RobotConnectionError, RobotRefused, RobotTimeout
 from coneskin.robot.sim.process import SimulatedController, free_host
-from coneskin.robot.ur.program_io import RtdeVariableReader
+from coneskin.robot.ur.program_io import RtdeOutputWriter, RtdeVariableReader
+from coneskin.robot.ur.rtde_codec import Recipe
 from tests.support.scenes import START
-
-pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +38,26 @@ def until_refused(read):
     until(is_refused)
 
 
+@pytest.mark.parametrize(
+    ("output", "packed"),
+    [
+        ((0, 0.25), (1, 1, 0.25, 0.0)),
+        ((1, 0.25), (2, 2, 0.0, 0.25)),
+        ((0, 0.25, "current"), (1, 0, 0.25, 0.0)),
+        ((1, 1.0, "current"), (2, 0, 0.0, 1.0)),
+    ],
+)
+def test_an_analog_output_has_its_bit_in_the_mask_and_a_voltage_in_the_types(
+    monkeypatch: pytest.MonkeyPatch, output, packed
+) -> None:
+    """RTDE guide: two bytes whose bits 0 and 1 are the outputs, 1 for a voltage, and the ratios of both."""
+    writer, sent = RtdeOutputWriter("nowhere"), []
+    monkeypatch.setattr(writer, "_write", lambda names, values: sent.append(Recipe(names).pack(values)))
+    writer.set_analog(*output)
+    assert sent == [b"\x01" + struct.pack(">BBdd", *packed)]
+
+
+@pytest.mark.long
 def test_a_value_is_never_old_and_a_connection_that_is_gone_is_opened_again(controller) -> None:
     with RtdeVariableReader(controller.host, timeout=60.0) as reader:
         assert reader.value("actual_q") == pytest.approx(START)

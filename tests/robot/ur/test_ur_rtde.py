@@ -1,9 +1,13 @@
 """Motions by the wheel: each mode has its own stop, and what it refuses is an error; on a twin of the wheel."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import pytest
 
-from coneskin.core.errors import RobotConnectionError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
+from coneskin.robot.ur import ur_rtde
 from coneskin.robot.ur.ur_rtde import Mode, _rtde_errors, stop_time
 
 from .fake_wheel import arm, stops
@@ -50,6 +54,21 @@ def test_no_motion_starts_on_a_live_thread_of_another_kind():
         *("stopJ", "speedL", "speedJ", "speedStop", "servoL", "servoStop", "speedL", "speedStop"),
         *("movePath", "stopJ", "servoJ"),
     ]
+
+
+@pytest.mark.parametrize(("looks", "runs"), [(3, True), (100_000, False)])
+def test_a_program_that_starts_some_looks_after_its_upload_is_waited_for(monkeypatch, looks, runs):
+    now = [100.0]
+
+    def sleep(seconds):
+        now[0] += seconds
+
+    monkeypatch.setattr(ur_rtde, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+    a = arm()
+    a.control.playing, a.control.late = False, looks
+    with nullcontext() if runs else pytest.raises(RobotError, match="does not start ur_rtde's program again"):
+        a.revive()
+    assert [call[0] for call in a.control.calls] == ["kick", "reuploadScript", *["setWatchdog"] * runs]
 
 
 def test_what_the_wheel_refuses_is_an_error():

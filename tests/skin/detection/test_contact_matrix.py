@@ -1,6 +1,7 @@
 """Contact matrix of a frame against the exact field model, whatever lies between the sheets and the converter."""
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -42,13 +43,14 @@ def sensor_of(polarity: Polarity, lead: float, bits: int = 16, load: float = 1e6
     return Sensor(CONE, polarity=polarity, upper_sheet_ohms=UPPER, lower_sheet_ohms=LOWER, electronics=parts)
 
 
-def model() -> FieldModel:
-    return FieldModel(SectorSheet.of_frustum(CONE), UPPER, LOWER)
+def model(upper: float = UPPER, lower: float = LOWER) -> FieldModel:
+    return FieldModel(SectorSheet.of_frustum(CONE), upper, lower)
 
 
 def exact_frame(sensor: Sensor, coupling: Coupling) -> Any:
     """A frame whose counts are not rounded."""
-    parts, y = sensor.electronics, model().admittance(coupling)[0].tolist()
+    parts, field = sensor.electronics, model(sensor.upper_sheet_ohms, sensor.lower_sheet_ohms)
+    y = field.admittance(coupling)[0].tolist()
     volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
     inputs = measure(sensor, (y, y, y))._asdict()
     counts = {k: v * (ampere if k.endswith("current") else volt) for k, v in inputs.items() if k in Frame._fields}
@@ -113,12 +115,12 @@ def test_a_frame_that_cannot_be_is_not_inverted_or_leaves_a_remainder(dead):
 
 @pytest.mark.pure  # it steps by parts of a count
 @pytest.mark.parametrize("polarity", POLARITIES)
-@pytest.mark.parametrize("touch", TOUCHES)
+@pytest.mark.parametrize(("touch", "sheets"), [*((one, (UPPER, LOWER)) for one in TOUCHES), ("two", (3000.0, 300.0))])
 @pytest.mark.parametrize("length", [36, 40])
-def test_the_noise_is_that_of_differences(touch, polarity, length):
+def test_the_noise_is_that_of_differences(touch, sheets, polarity, length):
     """Each count moved by one up and down, and the squares of what that does summed up."""
-    sensor = sensor_of(polarity, 3.0)
-    frame = exact_frame(sensor, model().discs(TOUCHES[touch]))
+    sensor = replace(sensor_of(polarity, 3.0), upper_sheet_ohms=sheets[0], lower_sheet_ohms=sheets[1])
+    frame = exact_frame(sensor, model(*sheets).discs(TOUCHES[touch]))
     inversion = FrameInversion(sensor)
     at = inversion.invert(frame[6:18])
     assert at is not None
@@ -139,5 +141,5 @@ def test_the_noise_is_that_of_differences(touch, polarity, length):
         i, j = numbers.index(one), numbers.index(two or one)
         truth = sum(slope[i] * slope[j] for slope in slopes)
         size = math.sqrt(sum(slope[i] ** 2 for slope in slopes) * sum(slope[j] ** 2 for slope in slopes))
-        # 5 % of the deviations is what is left out: a twentieth of the noise of a place
-        assert value == pytest.approx(truth, abs=0.1 * size), name
+        # 5 % of the deviations is what is left out: a twentieth of the noise of a place; and 2 % of what sheets share
+        assert value == pytest.approx(truth, abs=(0.02 if "_a" in name else 0.1) * size), name

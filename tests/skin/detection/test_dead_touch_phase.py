@@ -18,7 +18,7 @@ from coneskin.skin.virtual.imperfections import ContactLaw, Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Frame
 
-from ..bench_top import CONE, UR10
+from ..bench_top import CONE, UR10, measured
 
 SENSORS = {"forearm": Frustum(0.0375, 0.0375, 0.24, math.radians(350)), "cone": CONE, "upper arm": UR10}
 TOUCH_PHASE = ("touch_c", "touch_d", "touch_current")
@@ -132,3 +132,17 @@ def test_more_noise_than_the_thresholds_bear_is_a_fault():
     assert Fault.NOISE in {event.fault for event in events}
     assert not detector.ready
     assert not any(isinstance(event, TouchBegan) for event in events)
+
+
+@pytest.mark.parametrize(("deviations", "contact"), [(6.0, False), (8.0, True)])
+@pytest.mark.parametrize("sign", [1, -1], ids=["both move", "they part"])
+@pytest.mark.parametrize("pair", [("radial_c", "radial_d"), ("angular_a", "angular_b")])
+def test_what_noise_does_once_in_twelve_days_is_no_contact(pair, sign, deviations, contact):
+    """Six deviations of a mean or a difference of two readings are once in 1e9 frames; beyond eight nothing hides."""
+    sensor, noise = Sensor(UR10), 10.0
+    currents, rest = UntouchedCurrents(sensor, 0.0), measured(sensor)._replace(**dict.fromkeys(pair, 200))
+    currents.noise = noise
+    guides, moved = UntouchedGuides(currents), round(deviations * noise / math.sqrt(2.0))
+    assert not guides.contradict(rest, 0.0, 1e-3)
+    moves = dict(zip(pair, (200 + moved, 200 + sign * moved), strict=True))
+    assert guides.contradict(rest._replace(**moves), 0.0, 1e-3) is contact

@@ -10,8 +10,9 @@ from coneskin.geometry.frustum import Frustum
 from coneskin.skin.diagnosis.capture import Capture, CaptureWindow
 from coneskin.skin.diagnosis.cause import Cause
 from coneskin.skin.diagnosis.diagnose import diagnose
-from coneskin.skin.diagnosis.foreign_checksum import crc16
+from coneskin.skin.diagnosis.foreign_checksum import crc16, find_checksum
 from coneskin.skin.diagnosis.frame_numbers import measure_numbers
+from coneskin.skin.electronics import Electronics
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import WiringFaults
 from coneskin.skin.virtual.fault_injection import FaultInjection
@@ -95,6 +96,34 @@ def test_the_names_of_crcs_are_those_of_the_catalogue() -> None:
     assert crc16(check, 0x8005, 0, reflected=True) == 0xBB3D  # ARC
 
 
+def test_a_crc_of_any_known_polynomial_is_found_without_its_start_value() -> None:
+    """Those of USB, DNP, T10-DIF, TELEDISK, CDMA2000, DECT and others, bit by bit, from a start that nobody knows."""
+    draw = random.Random(2)
+    for polynomial in (0x8005, 0x3D65, 0x8BB7, 0xA097, 0xC867, 0x0589, 0x5935, 0x8D95):
+        frames = []
+        for _ in range(4):
+            body, register = draw.randbytes(8), 0x1234
+            for bit in "".join(f"{byte:08b}" for byte in body):
+                out = register >> 15 ^ int(bit)
+                register = (register << 1 & 0xFFFF) ^ out * polynomial
+            frames.append(body + register.to_bytes(2, "little"))
+        found = find_checksum(frames)
+        assert found.item == Cause.CRC_POLYNOMIAL.key
+        assert f"its polynomial is 0x{polynomial:04X}" in found.value
+
+
+@pytest.mark.parametrize(("start", "cause"), [(0xFFFF, Cause.CRC_START), (None, Cause.DAMAGED)])
+def test_a_rule_that_three_of_four_checksums_follow_is_named_and_chance_is_not(start: int | None, cause: Cause) -> None:
+    draw, window = random.Random(3), CaptureWindow(0.0)
+    for number, (time, data) in enumerate(VirtualSkin(SENSOR, model="ladder", duration=0.03).packets()):
+        if number % 4:
+            tail = draw.randbytes(2) if start is None else crc16(data[:-2], 0x1021, start).to_bytes(2, "big")
+            data = data[:-2] + tail
+        window.feed(data, time)
+    found = diagnose(window.capture(0.03), (SENSOR,), None)
+    assert found.item == cause.key, found.line
+
+
 def test_every_other_cause_is_in_the_corpus() -> None:
     rare = {Cause.FEW_BYTES, Cause.NIBBLES_SWAPPED, Cause.WORDS_SWAPPED, Cause.UBX, Cause.CRC_UNKNOWN}
     rare |= {Cause.CLOCK_SECONDS, Cause.HELD_UP, Cause.SHORT} | {
@@ -160,6 +189,16 @@ def test_all_currents_at_full_scale_are_the_boards() -> None:
     found = diagnose(window.capture(0.4), (SENSOR,), None)
     assert found.item == Cause.CURRENT_OFF.key
     assert "shunt" in found.remedy
+
+
+@pytest.mark.parametrize("bits", [8, 9])
+def test_a_converter_of_fewer_bits_than_the_scene_says_is_told_by_its_supply(bits: int) -> None:
+    board, window = Sensor(SENSOR.frustum, electronics=Electronics(adc_bits=bits)), CaptureWindow(0.0)
+    for time, data in VirtualSkin(board, model="ladder", duration=0.1).packets():
+        window.feed(data, time)
+    found = diagnose(window.capture(0.1), (SENSOR,), None)
+    assert found.item == Cause.CONVERTER_BITS.key, found.line
+    assert f"as a converter of {bits} bits, not 12" in found.value
 
 
 @pytest.mark.parametrize(("volts", "named"), [(0.0, False), (0.02, True)])

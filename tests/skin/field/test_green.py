@@ -51,6 +51,18 @@ def test_green_function_is_its_eigenfunction_series(name: str, lower: float) -> 
             assert value == pytest.approx(exact, abs=2e-14)  # the mean over a circle is the value in its middle
 
 
+@pytest.mark.parametrize("name", ["cylinder", "long strip"])
+def test_a_disc_of_a_nanometre_loses_no_digit(name: str) -> None:
+    """Its own logarithm is left out, which leaves (Ra + Rb)/(2 pi) ln(1/radius): nothing else depends on its size."""
+    sheet, values = SHEETS[name], []
+    strip = Strip.of(sheet.length, sheet.breadth)
+    for radius in (1e-6, 1e-9):
+        at = np.array([[0.3 * sheet.width]]), np.array([[0.4 * sheet.wrap]]), np.array([[radius]]), np.array([[1.0]])
+        circles = make_circles(sheet, strip, Discs(*at), 1, 4)
+        values.append(green_block(strip, circles, 0, 0, 1.0, 3.0)[0][0, 0, 0])
+    assert values[1] - values[0] == pytest.approx(4.0 / (2.0 * math.pi) * math.log(1e3), abs=1e-13)
+
+
 @pytest.mark.parametrize("x", [1e-12, 1e-3, 0.7, 3.0, 9.9, 40.0, 1e3, 1e6, 1e10, 1e150])
 def test_bessel_ratios(x: float) -> None:
     got = bessel_ratios(np.array([x]), 130)[0]

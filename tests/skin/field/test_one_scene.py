@@ -91,6 +91,18 @@ def test_the_error_that_is_told_holds_where_symmetry_hides_the_orders() -> None:
                 assert error_of(model, found, exact) <= found.error[0] <= tolerance, (sheet, scene, lower)
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_the_error_that_is_told_has_no_unit(unit: float) -> None:
+    """Sheets of a thousand times the ohms, with contacts of as much less siemens, are the same field."""
+    scene, errors = [(0.04, 0.5, 0.012, 40.0), (0.06, 0.7, 0.008, 900.0)], []
+    for scale in (1.0, unit):
+        model = FieldModel(CONE, 1000.0 * scale, 150.0 * scale, 1e-5)
+        found = model._scenes.solve([(u, phi, radius, g / scale) for u, phi, radius, g in scene])
+        assert found is not None
+        errors.append(found.error[0])
+    assert errors[1] == pytest.approx(errors[0], rel=1e-6)
+
+
 def test_a_model_answers_one_scene_as_it_answers_many() -> None:
     model = FieldModel(CONE, 1000.0, 300.0, 1e-9)
     many = model.contacts([0.05, 0.04], [0.6, 0.6], 0.01, 30.0)

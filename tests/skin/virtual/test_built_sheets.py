@@ -50,6 +50,9 @@ def test_a_line_fed_at_one_end_has_the_resistance_of_its_ladder() -> None:
     bare = np.array(BuiltSheets((SheetFlaws(lines=(3.0, 0.0)), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
     ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
     assert 1.0 / bare[0, 0] - 1.0 / ideal[0, 0] == pytest.approx(1.0, rel=0.02)
+    currents = np.kron(np.diag([bare[0, 0], ideal[2, 2]]), [[1.0, -1.0], [-1.0, 1.0]])
+    # what enters at A leaves at B, and the lower sheet feels nothing; 1e-8 is the rounding of a line of 0.1 mohm
+    assert bare == pytest.approx(currents, abs=1e-7)
 
 
 def test_what_peels_off_narrows_the_way_of_the_current() -> None:
@@ -65,6 +68,15 @@ def test_the_floor_holds_a_fifth_of_an_electrode_that_no_reading_shows_to_have_p
         floor = PlaceFloor(tolerance, size, (1048.0, 954.0))
         variances = np.array([[floor.at(a, b, 0.0, 0.0)[0] for b in x] for a in x])
         assert bool(np.mean(off**2 < 3.84 * variances) > 0.93) is held
+
+
+@pytest.mark.parametrize(("size", "at", "number"), [((0.1, 1.0), (0.5, 1.0), 0), ((1.0, 0.1), (1.0, 0.5), 2)])
+def test_a_current_that_runs_aslant_is_turned_back_at_the_edges(size, at, number) -> None:
+    """At the edge of a wide sheet, half-way, Catalan's constant by 4/pi^2, of which two terms lack 3 %."""
+    floor = PlaceFloor(SheetTolerance(skew=0.02), size, (1000.0, 1000.0))
+    moved = 0.02 * 0.1 * 4.0 / math.pi**2 * 0.915966
+    assert math.sqrt(floor.at(*at, 0.0, 0.0)[number]) == pytest.approx(moved, rel=0.04)
+    assert floor.at(0.5, 0.5, 0.0, 0.0)[number] == 0.0
 
 
 @pytest.mark.parametrize(("slope", "across", "skew", "stretch"), [(0.2, 0.1, 0.05, 0.1), (-0.3, 0.0, -0.1, 0.0)])

@@ -12,8 +12,6 @@ from coneskin.robot.stop.limits import MonitoringLimits
 from coneskin.robot.stop.stop_monitor import STANDSTILL_SAMPLES
 from tests.support.guard_rig import GuardRig, touch
 
-pytestmark = pytest.mark.long
-
 SLOW = 0.05  # m/s
 
 
@@ -138,6 +136,7 @@ def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     assert out == [SetSpeedSlider(1.0)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setting", [0.1, 0.3])
 def test_a_person_who_slows_the_arm_between_two_touches_is_heard(setting):
     """0.9 before: what a slow arm had before the first touch was put back after the second."""

@@ -14,6 +14,7 @@ from coneskin.robot.sim.machine.states import (
     PopupNotice,
     ProgramFailed,
     ProgramNotice,
+    Runtime,
     SafetyNotice,
     TextNotice,
 )
@@ -149,6 +150,14 @@ def test_it_says_where_the_arm_is_and_what_it_does():
     assert state[3][-10] == 3  # safety mode, before three bytes, a word and three bytes
     tool = struct.unpack(">12d", state[4])[:3]
     assert tool == pytest.approx(controller.arm.tcp_pose().translation)
+
+
+@pytest.mark.parametrize(("name", "running", "paused"), [("STOPPED", 0, 0), ("PLAYING", 1, 0), ("PAUSED", 0, 1)])
+def test_it_says_whether_a_program_runs_or_is_paused(name, running, paused):
+    controller = Controller(Options())
+    controller.runtime = Runtime[name]
+    mode = struct.unpack(">Q7BBBdddB", sub_packages(_encode_state(controller))[0])
+    assert mode[6:8] == (running, paused)
 
 
 def test_the_arm_is_named_as_recorded():

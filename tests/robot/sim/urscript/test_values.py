@@ -50,6 +50,8 @@ def test_no_result_grows_without_a_bound() -> None:
     """Whole numbers have 32 bits, beyond them they are doubles; a text and a list have a longest length."""
     assert _power(2, 10) == 1024
     assert isinstance(_power(2, 10), int)
+    assert [repr(_power(7, exponent)) for exponent in (1, 0)] == ["7", "1"]
+    assert _power(2, -1) == 0.5
     assert _power(9, 100) == pytest.approx(9.0**100)
     assert isinstance(_multiply(2**30, 2**30), float)
     assert isinstance(_add(2**31 - 1, 1), float)
