@@ -9,7 +9,7 @@ With x and y parts of the sides, R the sheet's resistance from electrode to elec
     leads and the electrodes' own lines    ((1 - x)^2 + x^2) ohm^2/R^2
     resistance that grows along the sheet  (x (1 - x)/2)^2 slope^2
     patches                                x (1 - x) patches^2 c
-    current that runs aslant               h(x, y)^2 skew^2 (breadth/length)^2
+    current that runs aslant               h(x, y)^2 skew^2
     an electrode at x = 0 that peels off   (((1 - x) f)^2 + .092 peel^3 exp(-13.4 x length/breadth)) (breadth/length)^2
 
 are variances of x. f = ln sec(pi peel/2)/pi is what the gap throttles; the rest of a peel is fitted to finite elements.

@@ -138,7 +138,7 @@ class FaultyLine:
             if index < faults.replay_after:
                 self._first.append(data)
             elif self._first:
-                data = self._first[(index - faults.replay_after) % len(self._first)]
+                data = self._first[index % len(self._first)]  # all of those before
         if _from(faults.stall_after, index) and (
             not faults.stall_frames or index < (faults.stall_after or 0) + faults.stall_frames
         ):

@@ -3,8 +3,9 @@
 import io
 import math
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,14 @@ def pixels(page: Any, at: tuple[int, int], around: int = 5) -> np.ndarray:
     page.add_style_tag(content="[class*=Notifications-root] { display: none !important }")
     picture = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB")).astype(int)
     return picture[at[1] - around : at[1] + around + 1, at[0] - around : at[0] + around + 1].reshape(-1, 3)
+
+
+def wait_for_pixels(page: Any, at: tuple[int, int], right: Callable[[np.ndarray], bool], around: int = 5) -> None:
+    """Wait until a place of the page looks right: a busy computer draws late, and fades what is old."""
+    end = monotonic() + 1e-3 * TIMEOUT
+    while not right(found := pixels(page, at, around)):
+        assert monotonic() < end, f"the place does not look so: {np.unique(found, axis=0)[:20]}"
+        page.wait_for_timeout(100)
 
 
 def magenta(found: np.ndarray) -> int:

@@ -30,6 +30,7 @@ from .browser import (
     quiet,
     shown_trace,
     violet,
+    wait_for_pixels,
     wait_for_text,
 )
 
@@ -67,15 +68,15 @@ def test_a_recording_is_scrubbed_to_its_touch() -> None:
         forward.click()
         wait_for_text(page, "#coneskin-clock", "2.970 s")
         place = look_closely(server, page, point, normal)
-        assert magenta(pixels(page, place)) > 5
+        wait_for_pixels(page, place, lambda found: magenta(found) > 5)
         assert page.evaluate(SMOOTHED) is False, "a processor draws here"
         page.get_by_label("potential").first.click()
         page.get_by_role("option", name="touch phase, lower sheet").click()
         wait_for_text(page, "#coneskin-potential", " V")
-        assert violet(pixels(page, place, 60)) > 50
+        wait_for_pixels(page, place, lambda found: violet(found) > 50, 60)
         page.get_by_role("button", name="|<", exact=True).click()
         wait_for_text(page, "#coneskin-clock", "1.788 s")
-        assert magenta(pixels(page, place)) == 0
+        wait_for_pixels(page, place, lambda found: magenta(found) == 0)
         for words in ("a run", "play", "traces"):
             assert words in page.inner_text("body")
         assert page.wrong == []
@@ -119,7 +120,10 @@ def test_a_file_shows_the_contact_where_it_was_when_it_was(tmp_path: Path) -> No
             page.evaluate(JUMP, words)
             wait_for_text(page, "#coneskin-clock", clock)
             place = look_closely_at_a_file(page, "/run 1", point, normal)
-            assert (magenta(pixels(page, place)) > 5) is marked, words
+            if marked:
+                wait_for_pixels(page, place, lambda found: magenta(found) > 5)
+            else:
+                assert magenta(pixels(page, place)) <= 5, words
         assert f"{at:.4f} s touch located" in page.inner_text("#coneskin-events"), "the same clock"
         assert [box for box in page.query_selector_all("#root input") if box.is_visible() and "." in box.input_value()
                 and not box.input_value().endswith("x")] == [], "no other clock"  # fmt: skip
@@ -158,13 +162,13 @@ def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_pat
         wait_for_text(page, ".coneskin-phase.active", "active")
         wait_for_text(page, "#coneskin-legend", "Dark blue: a sheet of skin")
         place = look_closely(server, page, point, normal)
-        assert quiet(pixels(page, place)) > 50
+        wait_for_pixels(page, place, lambda found: quiet(found) > 50)
         assert magenta(pixels(page, place)) == 0
         write_until(located + 1e-6, located - 0.1)
         wait_for_text(page, ".coneskin-phase.stopped", "stopping")
         wait_for_text(page, ".coneskin-card", "u = 130.0 mm, phi = 89.0 deg")
-        assert magenta(pixels(page, place)) > 5
-        assert quiet(pixels(page, place, 40)) > 50, "where it was is marked, not the whole sheet"
+        wait_for_pixels(page, place, lambda found: magenta(found) > 5)
+        wait_for_pixels(page, place, lambda found: quiet(found) > 50, 40)  # where it was is marked, not the whole sheet
         write_until(3.842, located + 1e-6)
         for said in ("latched: stands until a manual reset", "driver, stands after 107 ms", "retreated 19.5 mm"):
             wait_for_text(page, "body", said)
@@ -193,7 +197,8 @@ def test_a_page_follows_a_recording_that_grows_and_says_when_it_does_not(tmp_pat
         server_thread.start()
         wait_for_text(page, "#coneskin-stale", "NOTHING NEW from the guard")
         assert page.inner_text("#root .coneskin-phase").startswith("was latched: stands until a manual reset, ")
-        assert magenta(pixels(page, look_closely(server, page, point, normal))) == 0, "the scene has faded"
+        place = look_closely(server, page, point, normal)
+        wait_for_pixels(page, place, lambda found: magenta(found) == 0)  # the scene has faded
         recorder.close()
         wait_for_text(page, "#coneskin-stale", "the run is over")
         over.set()

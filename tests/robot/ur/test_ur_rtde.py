@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from coneskin.core.errors import RobotConnectionError, RobotError, RobotRefused
+from coneskin.core.errors import RobotConnectionError, RobotRefused
 from coneskin.robot.driver.values import Waypoint
 from coneskin.robot.ur import ur_rtde
 from coneskin.robot.ur.ur_rtde import Mode, _rtde_errors, stop_time
@@ -66,7 +66,7 @@ def test_a_program_that_starts_some_looks_after_its_upload_is_waited_for(monkeyp
     monkeypatch.setattr(ur_rtde, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
     a = arm()
     a.control.playing, a.control.late = False, looks
-    with nullcontext() if runs else pytest.raises(RobotError, match="does not start ur_rtde's program again"):
+    with nullcontext() if runs else pytest.raises(RobotRefused, match="does not start ur_rtde's program again"):
         a.revive()
     assert [call[0] for call in a.control.calls] == ["kick", "reuploadScript", *["setWatchdog"] * runs]
 
