@@ -50,9 +50,7 @@ class _Watched:
     lowest: float
     window: float | None = None  # when the level was last found to have fallen [s]
     level: float = 0.0  # then
-    doubted: tuple[float, ContactOnLink] | None = (
-        None  # since when its place is not certain [s], and what was seen then
-    )
+    doubted: tuple[float, ContactOnLink] | None = None  # since when its place is doubtful [s], and what was seen then
 
 
 class ContactSupervision:

@@ -323,22 +323,18 @@ class UrArm:
                 that is as long as the stop may take.
         """
         mode, self.mode = self.mode, Mode.IDLE
-        if not at_once and mode is not Mode.IDLE:
-            with _rtde_errors("stopping"):
-                self._set_watchdog(stop_time(deceleration))
-                self._stop(mode, deceleration)
-                self._set_watchdog()
-            return
+        patient = not at_once and mode is not Mode.IDLE
         with _rtde_errors("stopping"):
-            self._stop(mode, deceleration)
-
-    def _stop(self, mode: Mode, deceleration: float) -> None:
-        if mode is Mode.SPEED:
-            self.control.speedStop(deceleration)
-        elif mode is Mode.SERVO:
-            self.control.servoStop(deceleration)
-        else:  # also when idle: a move may have been started by a call whose answer was lost
-            self.control.stopJ(deceleration)
+            if patient:
+                self._set_watchdog(stop_time(deceleration))
+            if mode is Mode.SPEED:
+                self.control.speedStop(deceleration)
+            elif mode is Mode.SERVO:
+                self.control.servoStop(deceleration)
+            else:  # also when idle: a move may have been started by a call whose answer was lost
+                self.control.stopJ(deceleration)
+            if patient:
+                self._set_watchdog()
 
     def _stand_for(self, name: str) -> None:
         """Refuse a call while something moves: one that waited would keep a stop waiting as well."""

@@ -76,9 +76,7 @@ def _inertial(link: LinkInertia, place: Pose) -> str:
 
 
 _CONTACT_MARGIN = -1.0  # m; of MuJoCo's own force, so far inside that it makes none
-_CONTACT_GAP = (
-    1.002  # m; beyond the margin, in which it reports contacts all the same: from 2 mm before two surfaces touch
-)
+_CONTACT_GAP = 1.002  # m; beyond the margin; contacts are reported in it all the same, 2 mm before surfaces touch
 _PRISM_SIDES = 96  # of the prism that a sheet is: its radius is wrong by at most 0.03 mm on a link of 50 mm
 _WALL_THICKNESS = 0.02  # m; thickness of a wall
 _SMALLEST_NUMBER = 1e-9  # kg m^2 and the like, where MuJoCo wants a number above 0

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from coneskin.scene.values.scene import Scene
     from coneskin.skin.sensor import Sensor
 
-_SHEET_HEIGHT = (
-    0.0015  # m above the surface that is sensed: the sheets are that thick, and their link is not to shine through
-)
+_SHEET_HEIGHT = 0.0015  # m above the sensed surface: sheets are that thick, and no link is to shine through
 _MAX_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
 _VERTEX_DISTANCE = 0.008  # m between two vertices along a side that is not straight, about
 _MAX_VERTICES = 96  # vertices along or around
