@@ -428,6 +428,11 @@ def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> Pla
 _SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
 
 
+def _blind_angle(design: SheetDesign) -> float:
+    """Return the angle about the axis in which a sheet locates no touch: its seam, and what it does not wrap [rad]."""
+    return math.tau - (design.layout.active.phi2 - design.layout.active.phi1)
+
+
 def cover_seams(designs: Sequence[SheetDesign], mesh: Mesh | None = None) -> tuple[SheetDesign, ...]:
     """Add a strip over the seam of every full wrap, where the options ask for it.
 
@@ -480,12 +485,11 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
     trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * math.tau)
     inside = lay_out_sheet(trial, plan).active
     before, after = inside.phi1, trial.wrap - inside.phi2
-    active = design.layout.active
-    wrap = before + (math.tau - (active.phi2 - active.phi1)) + after
+    wrap = before + _blind_angle(design) + after
     if wrap > 0.5 * math.tau:
         raise GeometryError(
             f"{design.name}: a strip over its seam would have to wrap {math.degrees(wrap):.0f} deg, at most 180: make "
             "electrodes and margins narrower"
         )
-    start = active.phi2 - before
+    start = design.layout.active.phi2 - before
     return above.part(0.0, outer.slant, start, start + wrap), 0.5 * (side.wrap + math.tau) - start
