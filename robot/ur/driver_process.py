@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.child_process import first_message, inherit, shorten_time_slice
-from coneskin.core.errors import ConeSkinError, RobotRefused
+from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import (
@@ -96,7 +96,7 @@ def carry_out(
             arm.servo(move, target, float(request.get("lookahead", 0.1)), float(request.get("gain", 300.0)))
             return _RequestOutcome(True, holds=duration)
         case "wait":
-            return _RequestOutcome(waits=arm.moving())
+            return _RequestOutcome(waits=arm.moving() or arm.arriving)
         case "progress":
             return _RequestOutcome(answer={"waypoint": arm.waypoint(), "mode": arm.mode.value})
     work(_ANSWER_TIME)
@@ -210,8 +210,9 @@ class DriverProcess:
             self._serve_program(message)
         if self._guard.closed or self._program.closed:
             return False
-        if self._waiting:
-            self._look_for_arrival()
+        if self._waiting and not self._arm.moving():
+            ended = {"ok": False, "stopped": True, "why": "the move was ended before the arm arrived"}
+            self._answer_waiting(**(ended if self._arm.arriving else {"ok": True}))
         if now > self._expires and self._try_to_stop(at_once=False):  # the program has not renewed it
             what = "no new speed or servo command of the program has come in time: the arm was stopped"
             self._guard.send(StatusReport("remark", what).encode())
@@ -292,6 +293,7 @@ class DriverProcess:
                 self._reply(number, ok=False, stopped=True, why="the guard does not let the arm move")
             elif request["do"] == "stop":
                 self._stop_for_program(_stop_acceleration(request))
+                self._arm.arriving = False
                 self._answer_waiting(ok=False, stopped=False, why="the program itself has stopped the arm")
                 self._reply(number, ok=True)
             else:
@@ -319,13 +321,6 @@ class DriverProcess:
             self._waiting.append(number)
         else:
             self._reply(number, ok=True, **outcome.answer)
-
-    def _look_for_arrival(self) -> None:
-        try:
-            if not self._arm.moving():
-                self._answer_waiting(ok=True)
-        except RobotRefused as exc:  # something else has ended the move: the guard will say what
-            self._answer_waiting(ok=False, stopped=True, why=str(exc))
 
     def _report_restart(self, over: bool) -> None:
         self._guard.send(StatusReport("restarted" if over else "restarts").encode())

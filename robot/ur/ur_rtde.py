@@ -113,6 +113,8 @@ class UrArm:
 
     Attributes:
         mode: what it does.
+        arriving: a move was started here, and has neither arrived nor been followed by another motion; without its mode
+            something else has ended it.
         control: the wheel's RTDEControlInterface; None outside the ``with``.
         wheel: its module.
         kick_period: after which the controller's watchdog is to be kicked at the latest [s].
@@ -125,6 +127,7 @@ class UrArm:
     def __init__(self, host: str, watchdog_hz: float) -> None:
         self.host = host
         self.mode = Mode.IDLE
+        self.arriving = False
         self.control: Any = None
         self.wheel: Any = None
         self._watchdog_hz = watchdog_hz
@@ -171,7 +174,7 @@ class UrArm:
         with _rtde_errors("starting the control program again"):
             if self.control.isProgramRunning():
                 return
-            self.mode = Mode.IDLE
+            self.mode, self.arriving = Mode.IDLE, False
             self.control.kickWatchdog()
             time.sleep(_REGISTER_DELAY)
             running = self.control.reuploadScript() and self._await_start()
@@ -274,21 +277,15 @@ class UrArm:
         return self.waypoint() is not None
 
     def waypoint(self) -> int | None:
-        """Return the number of the way point to which a move goes, from 0; None where no move runs.
-
-        Raises:
-            RobotRefused: the program on the controller has ended, so the arm has not arrived.
-        """
+        """Return the number of the way point to which a move goes, from 0; None where no move runs."""
         if self.mode is not Mode.MOVE:
             return None
         with _rtde_errors("asking for progress"):
             status = self.control.getAsyncOperationProgressEx()
-            if not self.control.isProgramRunning():
-                self.mode = Mode.IDLE
-                raise RobotRefused(f"the program on the controller {self.host} has ended before the arm arrived")
-            if status.isAsyncOperationRunning():
+            ended = not self.control.isProgramRunning()  # by somebody else, and the move with it
+            if status.isAsyncOperationRunning() and not ended:
                 return int(status.progress())
-        self.mode = Mode.IDLE
+        self.mode, self.arriving = Mode.IDLE, ended
         return None
 
     def ask(self, name: str, *values: object) -> object:
@@ -353,4 +350,4 @@ class UrArm:
                 f"the controller {self.host} did not take {name}: its program is not running, "
                 "or a protective stop holds the arm"
             )
-        self.mode = mode
+        self.mode, self.arriving = mode, mode is Mode.MOVE

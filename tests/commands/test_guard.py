@@ -184,11 +184,11 @@ def command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "stdin", [])
     handler = signal.getsignal(signal.SIGTERM)
 
-    def run(reported, at_close, check, gone=(), text=SERIAL_RETREAT):
+    def run(reported, at_close, check, gone=(), text=SERIAL_RETREAT, words=()):
         (tmp_path / "scene.toml").write_text(text)
         session = FakeSession(parse_scene(text), events(*reported), events(*at_close), check, gone)
         monkeypatch.setattr("coneskin.session.session.guard", lambda *_, **__: session)
-        return main(["guard", str(tmp_path / "scene.toml")]), capsys.readouterr().err
+        return main(["guard", str(tmp_path / "scene.toml"), *words]), capsys.readouterr().err
 
     yield run
     signal.signal(signal.SIGTERM, handler)
@@ -217,6 +217,19 @@ def test_ctrl_c_keeps_the_exit_code_and_says_what_is_known(command, reported, at
     ended, words = command(reported, at_close, interrupt)
     assert ended == code
     assert said in words
+
+
+@pytest.mark.parametrize(("name", "code"), [("contact", 3), ("fault", 1)])
+def test_without_an_arm_once_ends_at_the_first_touch_or_fault(command, name, code):
+    looks = []
+
+    def look(session):
+        looks.append(name)
+        session.events += events(name)
+        assert len(looks) < 3, "it goes on"
+
+    assert command(["activated"], [], look, text=SKIN_ONLY, words=["--once"])[0] == code
+    assert looks == [name]
 
 
 def collide(session):

@@ -81,6 +81,8 @@ def with_changes(text: str, *changes: tuple[str, str]) -> str:
         ('host = "127.0.0.1"', 'host = "[::1]:30002"', 'write "::1": the ports'),
         ('host = "127.0.0.1"', 'host = "me:word@10.0.0.2 30002"', 'write "10.0.0.2": the ports'),
         ('host = "127.0.0.1"', 'host = "ur://"', "write such as 10.0.0.2: the ports"),
+        ('host = "127.0.0.1"', 'host = "192.168..10"', "write such as 10.0.0.2: the ports"),
+        ('host = "127.0.0.1"', f'host = "{"a" * 64}.org"', "write such as 10.0.0.2: the ports"),
         ('host = "127.0.0.1"', 'host = "a"\nwatchdog_hz = 0', "arm.watchdog_hz must be from 1 to 100 Hz, got 0.0 Hz"),
         ('name = "forearm"', 'name = "tail"', "link tail: an arm has no such link; it has base, shoulder, upper_arm"),
         ('name = "forearm"', 'name = "forearm"\nmesh = "no.stl"', "link forearm.mesh: there is no regular file no.stl"),

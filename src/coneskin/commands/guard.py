@@ -180,6 +180,8 @@ class _Work:
         moves = self._moves() if self._session.scene.motion else None
         while time.monotonic() < self._end:
             self._session.check()
+            if self._once and self._session.scene.arm is None and exit_code(self._session.events, False):
+                return
             if moves is None:
                 person.answer_idle_line()
             elif next(moves, None) is None:

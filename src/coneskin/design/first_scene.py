@@ -240,7 +240,7 @@ def _middle_of_tube(cone: Frustum, link: str, model: str) -> str:
             f"link's mesh, or choose --link {' or '.join(TUBE_LENGTHS)}"
         )
     start = 0.5e3 * (abs(arm_model(model).a[TUBE_LENGTHS[link]]) - cone.height)
-    return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: end 1 along the link from the joint; the design knew no link"
+    return f"xyz_mm = [0, 0, {start:.1f}]       # MEASURE: where the active area begins, from the joint along the link"
 
 
 def _virtual(design: DesignFolder, count: int) -> str:

@@ -2,6 +2,7 @@
 
 import math
 import re
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES
 from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDesign, design_sheets
+from coneskin.design.sheets.summary import sensor_toml
 from coneskin.design.workshop.build_figures import BuildFigures, bill_of_materials, measure_build
 from coneskin.design.workshop.build_guide import common_lines, sheet_lines
 from coneskin.design.workshop.placement import find_placement, sharpest_bends
@@ -34,6 +36,17 @@ def built(frustum: Frustum, **options: object) -> tuple[SheetDesign, BuildFigure
 
 def guide(design: SheetDesign, figures: BuildFigures, folder: str = ".") -> str:
     return "\n".join([*common_lines([design], [figures]), *sheet_lines(design, figures, folder)])
+
+
+def test_without_a_mesh_it_says_how_far_the_active_area_is_from_the_edges_that_are_drawn() -> None:
+    design, figures = built(Frustum(0.045, 0.045, 0.15, math.radians(300.0)))
+    text = " ".join(sheet_lines(design, figures, "."))
+    away, turned = (float(x) for x in re.findall(r"end 1 is ([\d.]+) mm further .* points ([\d.]+) deg past", text)[0])
+    pose = tomllib.loads(sensor_toml(design, 0, "any"))
+    assert pose["xyz_mm"] == pytest.approx([0.0, 0.0, away], abs=0.05)
+    assert pose["rpy_deg"] == pytest.approx([0.0, 0.0, turned], abs=0.05)
+    assert away > 5.0
+    assert turned > 5.0
 
 
 def test_common_steps_are_told_once_and_a_sheet_has_two_pages_of_its_own() -> None:

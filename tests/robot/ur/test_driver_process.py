@@ -53,16 +53,68 @@ def test_the_end_of_a_move_is_told(driver):
     assert answers(program) == [{"number": 1, "ok": True}]
 
 
-def test_a_move_whose_program_something_else_has_ended_is_not_told_to_have_arrived(driver):
+_MOVE = {"do": "move_j", "q": [0.0] * 6, "speed": 1.0, "acceleration": 2.0}
+_MEANWHILE = [
+    *({"do": "progress"}, {"do": "wait"}, {"do": "set_tcp", "pose": [0.0] * 6}, _MOVE),
+    {"do": "speed_j", "qd": [0.1] * 6, "acceleration": 1.0, "duration": 0.5},
+    {"do": "servo_j", "q": [0.1] * 6, "duration": 0.5},
+]
+
+
+@pytest.mark.parametrize("meanwhile", [None, *_MEANWHILE], ids=lambda request: request and request["do"])
+@pytest.mark.parametrize("end", ["program", "stop that fails", "value that the wheel refuses"])
+def test_no_move_that_something_has_ended_is_told_to_have_arrived(driver, meanwhile, end):
+    """Whatever another thread of the program asks for when that is found."""
+    served, made, guard, program = driver
+
+    def fail(error):
+        def call(*_):
+            raise error
+
+        return call
+
+    guard.send(Release(7).encode())
+    move(program)
+    served.poll(0.0)
+    wheel = made.control
+    if end == "program":
+        wheel.running = wheel.playing = wheel.accepts = False
+    elif end == "stop that fails":
+        wheel.stopJ = fail(RuntimeError("no answer"))
+    else:
+        wheel.moveJ = wheel.speedJ = wheel.servoJ = fail(ValueError("the value is not within [0;3.14]"))
+    if meanwhile:
+        ask(program, **{**meanwhile, "number": 2})
+    for _ in range(3):
+        served.poll(0.0)
+    told = {answer["number"]: answer for answer in answers(program)}
+    assert not told.get(1, {}).get("ok"), told
+    if end == "program":
+        assert told[1]["stopped"]
+        assert "was ended before the arm arrived" in told[1]["why"]
+        ask(program, do="wait", number=3)  # of a move that was not waited for
+        served.poll(0.0)
+        assert answers(program)[0]["ok"] is False
+
+
+@pytest.mark.parametrize("end", ["stop", "reset"])
+def test_nothing_is_waited_for_after_a_stop_of_the_program_or_a_reset(driver, end):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
     move(program)
     served.poll(0.0)
-    made.control.running = made.control.playing = False
+    if end == "stop":
+        ask(program, do="stop", number=2, acceleration=2.0)
+    else:
+        guard.send(StopProgram(9.0).encode())
+        made.control.playing = False
+        served.poll(0.0)
+        guard.send(Release(8).encode())
     served.poll(0.0)
-    (answer,) = answers(program)
-    assert (answer["ok"], answer["stopped"]) == (False, True)
-    assert "has ended before the arm arrived" in answer["why"]
+    answers(program)
+    ask(program, do="wait", number=3)
+    served.poll(0.0)
+    assert [(answer["number"], answer["ok"]) for answer in answers(program)] == [(3, True)]
 
 
 def test_a_retreat_and_its_halt(driver):

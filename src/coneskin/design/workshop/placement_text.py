@@ -51,10 +51,12 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     yield from _height_lines(design, place)
     yield from _facing(design, place)
     if place.before is None:
+        pose = design.active.link_frustum
         yield (
-            "There is no mesh, so the link shows no datum: choose where end 1 and edge 0 lie, draw them, and write "
-            "where they are in the frame of your arm's link into `xyz_mm` and `rpy_deg` of the sensor file: x of the "
-            "sheet points at edge 0, z from end 1 to end 2."
+            "There is no mesh, so the link shows no datum: choose where end 1 and edge 0 lie, and draw them. In the "
+            "sensor file, `xyz_mm` and `rpy_deg` place the active area in the frame of your arm's link. Its end 1 is "
+            f"{in_mm(pose.translation[2])} further towards end 2, and its x points {math.degrees(pose.rpy[2]):.1f} deg "
+            "past edge 0, in the direction of the wrap. Its z runs from end 1 to end 2."
         )
     elif found := [(collar.play, collar.end) for collar in figures.collars if collar.play is not None]:
         play, end = min(found)

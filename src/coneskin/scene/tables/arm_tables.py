@@ -60,7 +60,7 @@ def _arm(table: Mapping[str, Any], problems: list[str]) -> ArmScene | None:
         problems.append("arm.host must name the controller, got an empty text")
     elif not _is_host(host := values.get("host", "?").strip()):
         alone = _HOST_IN_TEXT.match(host)
-        remedy = f'write "{alone[1] or alone[2]}"' if alone else "write such as 10.0.0.2"
+        remedy = f'write "{found}"' if alone and _is_host(found := alone[1] or alone[2]) else "write such as 10.0.0.2"
         what = f"arm.host must be a name or address, without scheme, port or path, got {host!r}"
         problems.append(f"{what}; {remedy}: the ports are those of the arm's model")
     if len(values) < len(k.ARM_KEYS):
@@ -74,7 +74,7 @@ def _is_host(text: str) -> bool:
     try:
         ipaddress.ip_address(text)
     except ValueError:
-        return re.fullmatch(r"[\w.-]+|\?", text) is not None
+        return re.fullmatch(r"[\w-]{1,63}(\.[\w-]{1,63})*\.?|\?", text) is not None
     return True
 
 
