@@ -57,10 +57,11 @@ def too_slow(fault):
 
 
 @contextmanager
-def guarded(controller, board, **named):
-    """Guard the arm, where the emulator keeps up with the time."""
-    for _ in range(3):
-        session = guard(board_scene(controller.host, board.path), **named)
+def guarded(controller, board, folder=None):
+    """Guard the arm, where the emulator keeps up with the time; each start has a recording of its own in a folder."""
+    for number in range(3):
+        recording = folder and folder / f"{number}.rec"
+        session = guard(board_scene(controller.host, board.path), recording=recording)
         try:
             session.open()
         except RobotRefused as refused:
@@ -76,7 +77,7 @@ def guarded(controller, board, **named):
 
 
 def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, board, tmp_path):
-    with guarded(controller, board, recording=tmp_path / "run.rec") as session:
+    with guarded(controller, board, tmp_path) as session:
         thread, raised = moving(session)
         until(lambda: fast(controller) or has_fault(session))
         board.touch(0.13, 1.55, duration=0.4)
@@ -86,7 +87,7 @@ def test_a_touch_stops_the_arm_where_it_is_and_replays_bit_by_bit(controller, bo
         assert isinstance(raised[0], Collision)
         assert raised[0].u == pytest.approx(0.13, abs=1e-3)
         assert_stopped_on_the_way(controller)
-    assert read_run(tmp_path / "run.rec").replay().same
+    assert read_run(session.recording).replay().same
 
 
 def has_fault(session):
