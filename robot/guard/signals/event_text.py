@@ -78,7 +78,7 @@ def _words(event: GuardEvent) -> str:
         case EventName.LATCHED:
             text = f"latched until a manual reset: {d['why']}"
         case EventName.ESCALATED:
-            text = f"no deceleration: escalating to the {d['path']} path"
+            text = f"the stop is not confirmed: escalating to the {d['path']} path"
         case EventName.STOP_FAILED:
             speed = "its speed is not known" if d["speed"] is None else f"{d['speed']:.3f} rad/s"
             often = "once" if d["rounds"] == 1 else f"{d['rounds']} times"

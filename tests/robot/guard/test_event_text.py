@@ -30,7 +30,7 @@ LINES: dict[str, tuple[dict[str, Any], str]] = {
         {"speed": 0.001, "paths": ["driver", "command"]},
         "standstill: 0.0010 rad/s; stop paths tried: driver, command",
     ),
-    "escalated": ({"path": "command"}, "no deceleration: escalating to the command path"),
+    "escalated": ({"path": "command"}, "the stop is not confirmed: escalating to the command path"),
     "stop_failed": (
         {"rounds": 2, "speed": 0.25},
         "standstill NOT confirmed, 0.250 rad/s: all stop paths used 2 times; use the emergency stop",
