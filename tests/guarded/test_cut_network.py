@@ -34,6 +34,7 @@ def assert_ended_by_the_watchdog(controller):
     """By the controller's own clock: 1 / 1 Hz, and what was on its way, more on a busy computer."""
     (cut,) = (event for event in controller.events("fault") if event["line"] == "cut network")
     ended = controller.events("watchdog")[-1]
+    assert ended["silence"] == pytest.approx(1.0, abs=0.003)
     assert 0.0 < ended["time"] - cut["time"] < 2.0
 
 

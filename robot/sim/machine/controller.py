@@ -197,9 +197,10 @@ class Controller(ScriptHost):
         return True
 
     def _check_watchdog(self, watchdog: InputWatchdog) -> None:
-        if self.runtime is not Runtime.PLAYING or (self.cycle - watchdog.fed) * CYCLE <= watchdog.period:
+        silence = (self.cycle - watchdog.fed) * CYCLE
+        if self.runtime is not Runtime.PLAYING or silence <= watchdog.period:
             return
-        self.log("watchdog", variable=watchdog.variable, action=watchdog.action)
+        self.log("watchdog", variable=watchdog.variable, action=watchdog.action, silence=round(silence, 3))
         if watchdog.action == "stop":
             self.stop_program(f"watchdog of {watchdog.variable}")
         elif watchdog.action == "pause":
