@@ -83,11 +83,20 @@ def turn_base(controller, session):
 
 
 def push_joints(controller, scene, u=0.13, phi=1.55, force=100.0):
-    """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them."""
+    """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them.
+
+    Joint by joint; returns when the last one felt it. An arm that gives way before feels what no touch explains.
+    """
     at = place_on_arm(scene)[0]
     turns = _push_torque(at.model, tuple(controller.state()["q"]), ContactOnLink(at.link, *at.place(u, phi)))
     for joint, (turn, each) in enumerate(zip(turns, UR_CURRENTS.torque_per_ampere, strict=True), 1):
         controller.call(f"resist {joint} {-force * turn / each:.4f}")
+    return time.monotonic()
+
+
+def gave_way_since(session, time):
+    """Tell whether the arm gave way only after a time, if at all."""
+    return all(event.time > time for event in session.events if event.name == "retreating")
 
 
 def until(what, seconds=DEADLINE):
