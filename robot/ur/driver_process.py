@@ -252,6 +252,7 @@ class DriverProcess:
                 case Release(number):
                     self._work(_START_TIMEOUT)
                     self._arm.revive()
+                    self._arm.arriving = False
                     self._allowed, self._patience = True, GUARD_SILENCE
                     self._guard.send(StatusReport("released", str(number)).encode())
         except ConeSkinError as exc:

@@ -174,7 +174,7 @@ class UrArm:
         with _rtde_errors("starting the control program again"):
             if self.control.isProgramRunning():
                 return
-            self.mode, self.arriving = Mode.IDLE, False
+            self.mode = Mode.IDLE
             self.control.kickWatchdog()
             time.sleep(_REGISTER_DELAY)
             running = self.control.reuploadScript() and self._await_start()

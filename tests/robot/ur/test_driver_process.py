@@ -97,7 +97,7 @@ def test_no_move_that_something_has_ended_is_told_to_have_arrived(driver, meanwh
         assert answers(program)[0]["ok"] is False
 
 
-@pytest.mark.parametrize("end", ["stop", "reset"])
+@pytest.mark.parametrize("end", ["stop", "reset", "reset of an ended program"])
 def test_nothing_is_waited_for_after_a_stop_of_the_program_or_a_reset(driver, end):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
@@ -107,7 +107,7 @@ def test_nothing_is_waited_for_after_a_stop_of_the_program_or_a_reset(driver, en
         ask(program, do="stop", number=2, acceleration=2.0)
     else:
         guard.send(StopProgram(9.0).encode())
-        made.control.playing = False
+        made.control.playing = end == "reset"
         served.poll(0.0)
         guard.send(Release(8).encode())
     served.poll(0.0)
