@@ -32,7 +32,8 @@ from .ports.user_interface import UserInterface
 from .urscript.translator import Translation
 
 _STATE_PORTS = (*SCRIPT_PORTS, *(name + READ_ONLY for name in SCRIPT_PORTS))
-_WITH_NUMBERS = ("resist JOINT AMPERES", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
+_WITH_NUMBERS = ("resist A A A A A A", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
+_NUMBER = r"-?\d+(?:\.\d*)?(?:e-\d+)?"
 #: word of a line -> the services that it means
 _SERVICE_PORTS = {
     "rtde": ("RTDE",),
@@ -94,21 +95,21 @@ class _FaultInjector:
             return json.dumps({"error": str(exc)})
 
     def _with_number(self, command: str) -> Callable[[], Any] | None:
-        """Return what a line does that gives a number to a joint or to an input."""
-        match = re.fullmatch(r"(resist|digital input|analog input) (\d{1,3}) (-?\d+(?:\.\d*)?(?:e-\d+)?)", command)
+        """Return what a line does that gives numbers to the joints, or one to an input."""
+        if match := re.fullmatch(rf"resist((?: {_NUMBER}){{6}})", command):
+            return partial(self._resist, [float(current) for current in match[1].split()])
+        match = re.fullmatch(rf"(digital input|analog input) (\d{{1,3}}) ({_NUMBER})", command)
         if match is None:
             return None
         index, value, terminals = int(match[2]), float(match[3]), self._c.terminals
-        if match[1] == "resist":
-            return partial(self._resist, index - 1, value) if 1 <= index <= 6 else None
         if match[1] == "analog input":
             return partial(terminals.apply_analog, index, value)
         return partial(terminals.apply_digital, index, value != 0.0) if value in (0.0, 1.0) else None
 
-    def _resist(self, joint: int, current: float) -> list[float]:
-        """Let a motor, counted from 0, take so much current beyond the model of the arm [A]; return all of them."""
-        self._c.resistance[joint] = current
-        return self._c.resistance
+    def _resist(self, currents: list[float]) -> list[float]:
+        """Let the motors take so much current beyond the model of the arm [A]."""
+        self._c.resistance[:] = currents
+        return currents
 
     def _set(self, name: str, value: bool) -> bool:
         setattr(self, name, value)

@@ -83,20 +83,11 @@ def turn_base(controller, session):
 
 
 def push_joints(controller, scene, u=0.13, phi=1.55, force=100.0):
-    """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them.
-
-    Joint by joint; returns when the last one felt it. An arm that gives way before feels what no touch explains.
-    """
+    """Let the joints feel a push on the scene's first skin [N]: what touches a virtual skin does not reach them."""
     at = place_on_arm(scene)[0]
     turns = _push_torque(at.model, tuple(controller.state()["q"]), ContactOnLink(at.link, *at.place(u, phi)))
-    for joint, (turn, each) in enumerate(zip(turns, UR_CURRENTS.torque_per_ampere, strict=True), 1):
-        controller.call(f"resist {joint} {-force * turn / each:.4f}")
-    return time.monotonic()
-
-
-def gave_way_since(session, time):
-    """Tell whether the arm gave way only after a time, if at all."""
-    return all(event.time > time for event in session.events if event.name == "retreating")
+    currents = (-force * turn / each for turn, each in zip(turns, UR_CURRENTS.torque_per_ampere, strict=True))
+    controller.call("resist " + " ".join(f"{current:.4f}" for current in currents))
 
 
 def until(what, seconds=DEADLINE):
@@ -122,13 +113,13 @@ def until_undisturbed(attempt):
     Skips the test where none does, and far more processes want to run than there are cores.
 
     Args:
-        attempt: returns the guard's events, or its lines; None where this computer was too slow for the attempt itself.
+        attempt: returns the guard's events, or its lines.
     """
     end = time.monotonic() + 3.0 * DEADLINE
     while True:
         events = attempt()
-        said = " ".join(str(getattr(event, "details", event)) for event in events or ["the attempt was too slow"])
-        if events is not None and not any(words in said for words in _HELD_UP):
+        said = " ".join(str(getattr(event, "details", event)) for event in events)
+        if not any(words in said for words in _HELD_UP):
             return events
         if time.monotonic() > end and os.getloadavg()[0] > TOO_BUSY:
             pytest.skip("no verdict: this computer is too busy for any arm to be moved away")

@@ -31,7 +31,7 @@ def test_a_force_beside_the_skin_ends_the_retreat(tmp_path):
 
             def resist(event):
                 if event.name == "retreating":
-                    controller.call("resist 2 4")
+                    controller.call("resist 0 4 0 0 0 0")
 
             with guard(scene_for(controller, SLOWLY), recording=path, on_event=resist) as session:
                 thread, raised = run_until_moving(controller, session)

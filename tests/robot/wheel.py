@@ -16,7 +16,8 @@ from typing import Any
 from tests.support.paths import ROOT
 
 _CHILD = (
-    "import json, os, sys; from tests.robot import wheel_calls as calls; "
+    "import faulthandler, json, os, sys; faulthandler.dump_traceback_later(50.0); "
+    "from tests.robot import wheel_calls as calls; "
     "result = getattr(calls, sys.argv[1])(*json.loads(sys.argv[2])); "
     "print(); print('RESULT ' + json.dumps(result), flush=True); os._exit(0)"
 )

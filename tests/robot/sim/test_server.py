@@ -136,14 +136,6 @@ def test_a_cut_network_drops_packets_both_ways_and_closes_nothing() -> None:
         rtde.close()
 
 
-def test_a_motor_is_counted_from_1_and_there_are_six() -> None:
-    faults = Server(Controller(Options()), free_host()).faults
-    assert json.loads(faults.answer("resist 2 3.5")) == {"result": [0.0, 3.5, 0.0, 0.0, 0.0, 0.0]}
-    assert json.loads(faults.answer("resist 6 -1")) == {"result": [0.0, 3.5, 0.0, 0.0, 0.0, -1.0]}
-    for number in (0, 7):
-        assert "unknown fault" in json.loads(faults.answer(f"resist {number} 1"))["error"]
-
-
 def test_a_silent_dashboard_takes_commands_and_says_nothing() -> None:
     with Server(Controller(Options()), free_host()) as server, socket.socket() as client:
         server.faults.answer("dashboard silent")

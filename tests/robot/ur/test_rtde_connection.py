@@ -45,15 +45,15 @@ def test_it_reads_what_the_controller_does(controller):
 
 
 def test_it_reads_the_currents_that_the_motors_take(controller):
-    controller.call("resist 2 3.5")
+    assert controller.call("resist 0 3.5 0 0 0 -1e-1") == {"result": [0.0, 3.5, 0.0, 0.0, 0.0, -0.1]}
     with StateReader(controller.host, PATIENCE) as reader:
         state = reader.wait(PATIENCE)
-    controller.call("resist 2 0")
-    assert state.current == (0.0, 3.5, 0.0, 0.0, 0.0, 0.0)
+    controller.call("resist 0 0 0 0 0 0")
+    assert state.current == (0.0, 3.5, 0.0, 0.0, 0.0, -0.1)
     assert state.target_current == ZEROS
 
 
-@pytest.mark.parametrize("line", ["resist 7 1", "resist 2", "resist 2 nan", "resist 2 1 1"])
+@pytest.mark.parametrize("line", ["resist 1 1 1 1 1", "resist 1 1 1 1 1 1 1", "resist 1 1 1 nan 1 1"])
 def test_a_current_that_cannot_be_is_refused(controller, line):
     assert "unknown fault" in controller.call(line)["error"]
 
