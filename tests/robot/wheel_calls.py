@@ -521,7 +521,7 @@ def start_again_after_a_stop(host: str, revive: bool) -> dict[str, Any]:
             arm.revive()
         else:
             arm.control.reuploadScript()
-        out["runs"] = _until(lambda: receive.getRuntimeState() == 2)
+        out["runs"] = _until(lambda: receive.getRuntimeState() == 2, 10.0)
         out["moved"] = _until(lambda: receive.getActualQ() != stood, 0.3 if revive else 5.0)
         stops.use(StopPath.PROGRAM, 10.0)
     return out
