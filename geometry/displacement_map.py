@@ -152,5 +152,4 @@ def heights_by_ray(rays: RayCaster, placed: PlacedFrustum, u: Floats, phi: Float
     us, phis = np.meshgrid(u, phi, indexing="ij")
     points, normals = placed.place(us.ravel(), phis.ravel())
     lift = max(10.0 * limit, 0.005)
-    depth = rays.cast(points + lift * normals, -normals)[0]
-    return np.asarray((lift - depth).reshape(us.shape))
+    return np.asarray((lift - rays.cast(points + lift * normals, -normals)[0]).reshape(us.shape))

@@ -75,6 +75,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     from coneskin.core.version import code_build
 
     compiled = code_build() == "compiled"
+    items.sort(key=lambda item: item.path.name != "test_demos.py")  # the longest first: at the end one would wait
     for item in items:
         if _has_processes(item.path):
             item.add_marker(pytest.mark.processes)

@@ -33,6 +33,7 @@ def run(*words: object) -> int:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the names of files are texts there")
+@pytest.mark.long
 def test_a_name_that_is_no_text_is_written_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     record(tmp_path / "odd\udcff.rec")
     printed = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", errors="strict", write_through=True)

@@ -94,6 +94,7 @@ def test_a_run_is_replayed_and_a_link_unrolled(system: str, tmp_path: Path) -> N
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="imitates other systems on Linux")
 @pytest.mark.parametrize(("system", "said"), sweep([("win32", "COM3"), ("darwin", "/dev/cu.usbserial-1")]))
+@pytest.mark.long
 def test_a_scene_is_checked(system: str, said: str, tmp_path: Path) -> None:
     scene = f"""
 [[link]]

@@ -65,8 +65,7 @@ class PathSegment:
 
     def heading(self, fraction: float) -> float:
         """Return the direction of travel at a fraction of the length [rad]."""
-        chord = math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
-        return chord + (fraction - 0.5) * self.sweep
+        return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0]) + (fraction - 0.5) * self.sweep
 
     def at(self, fraction: float) -> FlatPoint:
         """Return the point at a fraction of the length [m]."""

@@ -33,7 +33,6 @@ from .urscript.translator import Translation
 
 _STATE_PORTS = (*SCRIPT_PORTS, *(name + READ_ONLY for name in SCRIPT_PORTS))
 _WITH_NUMBERS = ("resist A A A A A A", "digital input NUMBER 0 or 1", "analog input NUMBER VALUE")
-_NUMBER = r"-?\d+(?:\.\d*)?(?:e-\d+)?"
 #: word of a line -> the services that it means
 _SERVICE_PORTS = {
     "rtde": ("RTDE",),
@@ -96,13 +95,14 @@ class _FaultInjector:
 
     def _with_number(self, command: str) -> Callable[[], Any] | None:
         """Return what a line does that gives numbers to the joints, or one to an input."""
-        if match := re.fullmatch(rf"resist((?: {_NUMBER}){{6}})", command):
-            return partial(self._resist, [float(current) for current in match[1].split()])
-        match = re.fullmatch(rf"(digital input|analog input) (\d{{1,3}}) ({_NUMBER})", command)
+        lines = r"resist((?: NUMBER){6})|(digital|analog) input (\d{1,3}) (NUMBER)"
+        match = re.fullmatch(lines.replace("NUMBER", r"-?\d+(?:\.\d*)?(?:e-\d+)?"), command)
         if match is None:
             return None
-        index, value, terminals = int(match[2]), float(match[3]), self._c.terminals
-        if match[1] == "analog input":
+        if match[1]:
+            return partial(self._resist, [float(current) for current in match[1].split()])
+        index, value, terminals = int(match[3]), float(match[4]), self._c.terminals
+        if match[2] == "analog":
             return partial(terminals.apply_analog, index, value)
         return partial(terminals.apply_digital, index, value != 0.0) if value in (0.0, 1.0) else None
 

@@ -32,13 +32,16 @@ _REGISTER_DELAY = 0.02  # s, ten control cycles, until a register that was writt
 
 @contextmanager
 def _rtde_errors(doing: str) -> Iterator[None]:
-    """Convert the wheel's errors: it raises bare RuntimeError for everything.
+    """Convert the wheel's errors: it raises bare RuntimeError for everything but values that it does not take.
 
     Raises:
         RobotConnectionError: the wheel raised while doing this.
+        ValueError: what it was given for this is not within its limits.
     """
     try:
         yield
+    except ValueError as exc:
+        raise ValueError(f"{doing}: {exc}") from exc
     except RuntimeError as exc:
         if isinstance(exc, ConeSkinError):
             raise
@@ -341,7 +344,8 @@ class UrArm:
     def _start(self, kind: str, mode: Mode, *values: object) -> None:
         """Start a motion by the wheel's method of that kind."""
         name = _WHEEL_NAMES[kind]
-        self._started(getattr(self.control, name)(*values), name, mode)
+        with _rtde_errors(name):
+            self._started(getattr(self.control, name)(*values), name, mode)
 
     def _started(self, accepted: bool, name: str, mode: Mode) -> None:
         if not accepted:

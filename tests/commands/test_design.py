@@ -276,6 +276,7 @@ def test_a_folder_that_is_there_is_refused_before_any_work(tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize("height", ["60", *(pytest.param(mm, marks=pytest.mark.long) for mm in ("40", "4000"))])
+@pytest.mark.long
 def test_no_geometry_is_refused_for_its_electronics(height, tmp_path):
     words = ["--radius1-mm", "54", "--height-mm", height, "--no-pictures", "-o", str(tmp_path / "out")]
     assert design(*words) == 0

@@ -82,6 +82,7 @@ def test_a_persons_file_is_not_overwritten(
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.parametrize("swallowed", [False, True])
+@pytest.mark.long
 def test_a_signal_ends_the_command_and_leaves_nothing(
     number: signal.Signals, code: int, swallowed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -252,6 +252,7 @@ def test_an_arm_that_only_the_slider_holds_under_a_program_is_said_to_be_held_so
 HANGS = RobotConnectionError("the guard hangs")
 
 
+@pytest.mark.long
 def test_a_guard_that_is_gone_is_noticed_while_it_waits_for_a_reset(command):
     code, said = command(["activated", "stopping: touch"], [], collide, gone=[None, HANGS, HANGS])
     assert code == 1

@@ -34,6 +34,7 @@ def here(tmp_path: Path, designs: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     return tmp_path
 
 
+@pytest.mark.long
 def test_a_design_ends_with_the_next_command(tmp_path: Path, capsys: Output) -> None:
     assert main(["design", *CYLINDER, "-o", str(tmp_path / "my skin"), "--no-pictures"]) == 0
     assert capsys.readouterr().out.splitlines()[-1].startswith(f"next: coneskin init '{tmp_path / 'my skin'}'")
@@ -58,6 +59,7 @@ def test_a_simulated_scene_has_all_that_a_guard_needs(here: Path, capsys: Output
     assert main(["doctor", "scene.toml", "--check"]) == 0
 
 
+@pytest.mark.long
 def test_the_padding_is_as_thick_as_the_sheets_of_the_design(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     layers = ["--set", "layers.thickness_mm=[3, 0.2, 1, 0.2, 4]"]

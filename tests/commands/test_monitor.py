@@ -79,6 +79,7 @@ def test_a_computer_that_was_held_up_has_not_heard_that_the_device_stopped(
     assert Cause.STOPPED.key not in shown
 
 
+@pytest.mark.long
 def test_a_recording_is_diagnosed_with_the_times_that_it_has(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -267,6 +267,7 @@ def carry_out_case(machine: str, who: str, patch: pytest.MonkeyPatch) -> dict[st
         for number, who in enumerate(persons)
     ],
 )
+@pytest.mark.long
 def test_each_person_is_told_and_judged_as_before(machine: str, who: str, monkeypatch: pytest.MonkeyPatch) -> None:
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))
     assert carry_out_case(machine, who, monkeypatch) == golden[f"{machine}, {who}"]

@@ -27,5 +27,6 @@ def open_arm():
 
 
 @pytest.mark.parametrize("check", ARM_CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.long
 def test_the_driver_of_ur_arms_keeps_the_contract(check):
     check(open_arm)

@@ -121,6 +121,7 @@ def test_a_right_source_in_memory_keeps_it(check: Callable[[OpenLineFactory], No
         (_KeepsADescriptor, "_closing_twice_is_fine_and_reading_then_is_not"),
     ],
 )
+@pytest.mark.long
 def test_each_way_to_break_it_is_noticed(kind: type[_Memory], first: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(source_contract, "_LINE_TIMEOUT", 0.05)
     broken = []

@@ -35,6 +35,7 @@ def test_dimensions_have_units_and_lines_a_legend() -> None:
 
 @pytest.mark.parametrize("wires", ["end1", "end2"])
 @pytest.mark.parametrize("wrap_deg", [180.0, 270.0, 360.0])
+@pytest.mark.long
 def test_wires_are_drawn_from_the_tabs_past_the_tie_to_the_connector(wires: str, wrap_deg: float) -> None:
     module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
     figure = module.Figure()

@@ -38,6 +38,7 @@ def active_azimuths(design: SheetDesign, base: Pose) -> tuple[float, float]:
 @pytest.mark.parametrize("gap", [0.0, 2e-3])
 @pytest.mark.parametrize("side", ["end1", "end2"])
 @pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.long
 def test_sheet_and_strip_together_close_the_turn(name: str, side: SheetSide, gap: float) -> None:
     options = DesignOptions(cover_seam=True, wires=side, seam_gap=gap)
     sheet, strip = cover_seams(design_sheets([PlacedFrustum(SHAPES[name], POSE)], options))

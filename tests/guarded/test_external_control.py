@@ -283,6 +283,7 @@ def test_without_its_guard_the_watchdog_stops_the_arm(controller, run, number):
 
 @pytest.mark.promise("P45")
 @pytest.mark.parametrize("number", sweep([signal.SIGKILL, signal.SIGSTOP]))
+@pytest.mark.long
 def test_without_both_the_guarding_program_stops_the_arm(controller, run, number):
     with guard(external(controller)) as session:
         assert_short_slices(session, "guard", "watchdog")

@@ -153,6 +153,7 @@ class Ports:
 
 
 @pytest.mark.promise("P45")
+@pytest.mark.long
 def test_a_stop_goes_out_by_whatever_port_opens():
     hosts = []
     for _ in range(4):

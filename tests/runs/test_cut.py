@@ -86,6 +86,7 @@ def test_nothing_is_cut_out_of_a_part_that_is_damaged(collision: Run, tmp_path: 
         (float("nan"), 1.0, "a cut needs a moment"),
     ],
 )
+@pytest.mark.long
 def test_where_there_is_no_contact_nothing_is_cut(
     collision: Run, tmp_path: Path, around: float, keep: float, said: str
 ) -> None:

@@ -63,6 +63,7 @@ def golden(project: Project, change: object = None) -> None:
     (project.runs / "collision.events.json").write_text(json.dumps({"events": events}))
 
 
+@pytest.mark.long
 def test_a_tolerance_that_does_not_exist_is_refused_whatever_is_collected(project: Project) -> None:
     out = project.pytest("--coneskin-tolerance", "plaec_mm=1", code=4)
     assert "--coneskin-tolerance: there is no tolerance plaec_mm; there are place_mm" in out

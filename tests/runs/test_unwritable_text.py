@@ -36,6 +36,7 @@ def _renamed(block: Block) -> Block:
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "npz", "mcap"])
+@pytest.mark.long
 def test_it_is_exported(recording: Path, tmp_path: Path, form: str) -> None:
     pytest.importorskip({"parquet": "pyarrow", "mcap": "mcap"}.get(form, "numpy"))
     target = tmp_path / f"out.{form}"

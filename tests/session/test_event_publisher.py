@@ -258,6 +258,7 @@ def deaf_broker() -> Iterator[int]:
         taken[0].close()
 
 
+@pytest.mark.long
 def test_what_a_broker_does_not_read_is_dropped_and_counted(deaf_broker: int) -> None:
     pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
     publisher = EventPublisher(f"mqtt://127.0.0.1:{deaf_broker}")
@@ -268,6 +269,7 @@ def test_what_a_broker_does_not_read_is_dropped_and_counted(deaf_broker: int) ->
     publisher.close()
 
 
+@pytest.mark.long
 def test_an_attempt_to_connect_again_holds_no_program_up(deaf_broker: int, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("paho.mqtt", reason="the extra coneskin[mqtt] is not installed")
     from paho.mqtt.client import Client

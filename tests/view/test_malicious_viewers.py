@@ -102,6 +102,7 @@ def test_three_hundred_connections_that_say_nothing_leave_the_page_served() -> N
             assert viewer.hear()
 
 
+@pytest.mark.long
 def test_no_more_than_32_viewers_get_in_and_the_next_one_when_one_has_gone() -> None:
     with PageServer("a page", port=18180) as server:
         server.gui.add_html("words")
@@ -128,6 +129,7 @@ def test_ten_viewers_are_told_the_same() -> None:
             viewer.hear_until(lambda message: message.get("updates") == {"content": "stopping"})
 
 
+@pytest.mark.long
 def test_a_viewer_who_floods_is_read_no_faster_than_a_person_moves_a_control() -> None:
     """400 at once, then 200 a second; the others are told what is new meanwhile."""
     with PageServer("a page", port=18180) as server, socket_viewer(server) as attacker, socket_viewer(server) as viewer:

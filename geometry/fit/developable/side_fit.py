@@ -85,8 +85,7 @@ def fit_developable(
     trial = _start(section, rulings, full, common_apex, tolerance)
     if trial is None:
         return None
-    side = trial.side()
-    u = side.locate_all(points)[0]
+    u = trial.side().locate_all(points)[0]
     trial = replace(trial, slant=max(float(u.max()), 1e-3))
     best, error = trial, math.inf
     for _ in range(_FIT_ROUNDS):

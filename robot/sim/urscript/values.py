@@ -300,10 +300,6 @@ def call_method(value: Any, name: str, arguments: tuple[Any, ...]) -> tuple[Any,
 CHANGING_METHODS = frozenset(("append", "clear", "extend", "insert", "pop", "remove"))
 
 
-def _row_and_column_count(items: list[Any], _: int) -> Array:
-    return Array((len(items), len(items[0]) if is_matrix(items) else 1))
-
-
 #: method -> what it does with the elements and the capacity of a list
 _METHODS: dict[str, Callable[..., Any]] = {
     "append": lambda items, _, value: items.append(value),
@@ -317,7 +313,7 @@ _METHODS: dict[str, Callable[..., Any]] = {
     "length": lambda items, _: len(items),
     "pop": lambda items, _: items.pop(_index(items, len(items) - 1)),
     "remove": lambda items, _, index: items.__delitem__(_index(items, index)),
-    "shape": _row_and_column_count,
+    "shape": lambda items, _: Array((len(items), len(items[0]) if is_matrix(items) else 1)),
     "slice": lambda items, _, begin, end: Array(items[_index([*items, None], begin) : _index([*items, None], end)]),
 }
 

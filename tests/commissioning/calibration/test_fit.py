@@ -64,6 +64,7 @@ def test_offset_gain_and_shear_are_recovered(sensor: Sensor, count: int) -> None
 
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("bends", [BENT, COATED])
+@pytest.mark.long
 def test_a_bend_is_recovered_where_there_are_enough_touches(sensor: Sensor, bends: Bends) -> None:
     true = PlaceMap(sensor.frustum, *bends)
     fit = fit_map(sensor, touched(sensor, through(true), 16), PRECISE)
@@ -81,6 +82,7 @@ def judged(sensor: Sensor, fit: CalibrationFit, reads: Callable[[Place], Place],
     return math.sqrt(sum(squares) / len(squares))
 
 
+@pytest.mark.long
 def test_a_perfect_skin_is_mostly_left_alone() -> None:
     (sensor, _), rng = SENSORS, random.Random(2)
     fits = [fit_map(sensor, touched(sensor, lambda place: place, 9, 0.3e-3, seed)) for seed in range(20)]
@@ -101,6 +103,7 @@ def test_the_error_of_the_map_is_what_is_stated_for_places_that_nobody_touched()
     assert 0.8 < math.sqrt(said / squares) < 1.4  # that nothing else is wrong with the sheet, 16 touches do not show
 
 
+@pytest.mark.long
 def test_a_film_is_read_within_half_a_millimetre_and_that_is_what_is_stated() -> None:
     sensor, rng = SENSORS[0], random.Random(4)
     tall, wide = sensor.frustum.slant, sensor.frustum.wrap
@@ -134,6 +137,7 @@ def test_the_next_mark_is_where_the_map_is_known_least() -> None:
 
 
 @pytest.mark.parametrize("wrong", range(4))
+@pytest.mark.long
 def test_of_four_touches_none_may_be_15_mm_beside_its_mark(wrong: int) -> None:
     sensor = SENSORS[0]
     touches = touched(sensor, lambda place: place, 4, 0.3e-3)
@@ -145,6 +149,7 @@ def test_of_four_touches_none_may_be_15_mm_beside_its_mark(wrong: int) -> None:
 
 
 @pytest.mark.parametrize(("count", "step"), [(9, 1), (16, 3)])
+@pytest.mark.long
 def test_a_touch_beside_its_mark_is_left_out_and_named(count: int, step: int) -> None:
     sensor = SENSORS[0]
     true = PlaceMap(sensor.frustum, (0.004, -0.012, *[0.0] * 4), (-0.006, 0.02, *[0.0] * 4))

@@ -95,6 +95,7 @@ def test_a_right_skin_is_found_right() -> None:
 
 
 @pytest.mark.parametrize("wires", ["CDAB", "ACBD"])
+@pytest.mark.long
 def test_wires_that_must_be_moved_are_named(wires: str) -> None:
     doctor = examine(wires=wires)
     found = finding(doctor, "skin, wires")
@@ -163,6 +164,7 @@ def test_what_an_untouched_skin_has_wrong_is_named(skin: dict[str, object], item
     assert found.remedy
 
 
+@pytest.mark.long
 def test_a_clock_that_a_busy_computer_cannot_judge_is_no_fault_of_the_firmware() -> None:
     def clock(step: float, held: float = 0.0) -> Finding:
         seen = SensorStatistics()
@@ -247,6 +249,7 @@ def test_the_rate_that_the_scene_gives_a_virtual_skin_is_the_one_that_is_wanted(
     assert finding(examine(virtual, touches=False, rate_hz=90.0), "skin, rate").verdict == "warning"
 
 
+@pytest.mark.long
 def test_frames_of_touches_are_held_against_themselves() -> None:
     assert finding(right(), "skin, chi-squared").verdict == "ok"
     off = finding(examine(TEXT.replace("wrap_deg = 330", "wrap_deg = 330\npulldown_ohm = 11000")), "skin, chi-squared")

@@ -83,6 +83,7 @@ def test_loss_wrong_checksums_and_a_fast_clock_are_counted() -> None:
     ("begins", "ends", "late"), [(0.4, 9.0, 0.06), (0.3, 0.6, 0.15), (0.6, 9.0, 0.03), (0.0, 0.3, 0.08)]
 )
 @pytest.mark.parametrize(("ratio", "cause"), [(1.0, Cause.NONE), (1.3, Cause.CLOCK_RATIO), (0.5, Cause.CLOCK_RATIO)])
+@pytest.mark.long
 def test_a_computer_that_is_held_up_is_not_the_fault_of_the_board(
     begins: float, ends: float, late: float, ratio: float, cause: Cause
 ) -> None:
@@ -98,6 +99,7 @@ def test_a_computer_that_is_held_up_is_not_the_fault_of_the_board(
     assert (found.item == Cause.CLOCK_RATIO.key) == (cause is Cause.CLOCK_RATIO), found.line
 
 
+@pytest.mark.long
 def test_a_computer_that_loses_frames_while_it_is_held_up_is_named() -> None:
     """It reads nothing for half a second, the newest tenth of which the port has kept; twice in two seconds."""
 

@@ -30,6 +30,7 @@ def with_plate(mesh: Mesh, x: float) -> Mesh:
 
 
 @pytest.mark.parametrize("seam", [0.0, 100.0, 200.0, 290.0])
+@pytest.mark.long
 def test_a_narrow_sheet_is_looked_at_from_in_front(bench: Workbench, seam: float) -> None:
     bench.handle(0, Handles(wrap=math.radians(60.0), seam=math.radians(seam)))
     (design,) = bench.designs
@@ -40,6 +41,7 @@ def test_a_narrow_sheet_is_looked_at_from_in_front(bench: Workbench, seam: float
     assert way @ normal > math.cos(math.radians(45.0))
 
 
+@pytest.mark.long
 def test_a_sheet_behind_a_plate_is_looked_at_from_the_side(bench: Workbench) -> None:
     bench.handle(0, Handles())
     mesh = with_plate(bench.link.mesh, 0.08)

@@ -173,6 +173,7 @@ def test_a_seam_that_was_turned_is_said_where_it_is(bench: Workbench) -> None:
     assert bench.designs[0].place.link_frustum.rotate((1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0))
 
 
+@pytest.mark.long
 def test_a_sheet_is_added_where_its_side_is_bare_and_deleted(bench: Workbench) -> None:
     with pytest.raises(GeometryError, match="surface 1 is covered all along"):
         bench.add(0)
@@ -306,6 +307,7 @@ def test_a_link_that_takes_long_replaces_none_that_was_dropped_after_it(bench: W
         assert "quick.stl: 1 sheet" in page._said.content
 
 
+@pytest.mark.long
 def test_two_sheets_over_one_another_leave_no_room_for_a_third(bench: Workbench) -> None:
     bench.handle(0, Handles(along=0.05))
     bench.add(0)

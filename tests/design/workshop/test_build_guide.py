@@ -77,6 +77,7 @@ def test_common_steps_are_told_once_and_a_sheet_has_two_pages_of_its_own() -> No
 
 @pytest.mark.parametrize("assembly", ["loose", "pairs", "bonded"])
 @pytest.mark.parametrize("side", SIDES)
+@pytest.mark.long
 def test_every_part_has_its_step_and_its_face(assembly: str, side: SheetSide) -> None:
     from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 
@@ -119,6 +120,7 @@ def test_a_sheet_reads_what_its_conductive_layers_measure_between_their_electrod
 
 @pytest.mark.parametrize("side", ["end1", "end2"])
 @pytest.mark.parametrize("tab", [0.0, 0.012])
+@pytest.mark.long
 def test_wires_reach_one_connector_by_the_shorter_way(side: SheetSide, tab: float) -> None:
     design, figures = built(Frustum(0.054, 0.054, 0.2), plan=ElectrodePlan(tab=tab), wires=side)
     way = design.way

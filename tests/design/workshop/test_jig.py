@@ -68,6 +68,7 @@ def tube(bump: float | None = None, top: float = 0.08) -> Mesh:
     ],
 )
 @pytest.mark.parametrize("parts", [2, 3])
+@pytest.mark.long
 def test_every_part_is_a_watertight_solid(frustum: Frustum, parts: int) -> None:
     design = sheet(frustum, jig=JigPlan(parts=parts, reach=0.01))
     collars, without = jig_collars(design)
@@ -151,6 +152,7 @@ def ridged_tube(along: bool) -> tuple[Mesh, np.ndarray]:
 
 
 @pytest.mark.parametrize("along", [True, False])
+@pytest.mark.long
 def test_a_ridge_between_the_rays_keeps_its_clearance(along: bool) -> None:
     mesh, ridge = ridged_tube(along)
     design = sheet(Frustum(0.0502, 0.0502, 0.2))
@@ -179,6 +181,7 @@ def test_a_part_is_whole_where_a_block_begins_at_the_sheet_and_leaves_no_lip() -
 
 
 @pytest.mark.parametrize("way", [-1.0, 1.0])
+@pytest.mark.long
 def test_a_collar_turned_by_more_than_its_play_meets_what_stands_out(way: float) -> None:
     mesh = tube(bump=1.0)
     design = sheet(Frustum(0.05, 0.05, 0.2))

@@ -115,6 +115,7 @@ def test_the_name_of_a_narrow_electrode_leaves_a_fifth_of_its_foil_free_above_an
         + [("cylinder", "edge0"), ("widening", "end2"), ("flipped disc", "end1")],
     ),
 )
+@pytest.mark.long
 def test_no_two_strokes_run_on_each_other(name, side):
     """A cutter would burn twice. Marks may end on a border, but not run along it."""
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))

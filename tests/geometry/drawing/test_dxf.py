@@ -69,6 +69,7 @@ def seam_edges(strokes, cone, mirrored):
 
 
 @pytest.mark.parametrize(("name", "assembly"), sweep(dict.fromkeys([*KINDS, *EVERY_KIND]), short=len(KINDS)))
+@pytest.mark.long
 def test_cut_outlines_rolled_onto_the_cone_meet_at_the_seam_on_every_layer(name, assembly):
     link, stack = SHEETS[name], LayerStack(PAPER_STACK.layers, assembly)
     plan = ElectrodePlan()

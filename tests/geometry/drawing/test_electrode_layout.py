@@ -67,6 +67,7 @@ def test_a_tube_of_the_least_arc_has_room_and_a_narrower_one_has_none_for_wires_
 
 
 @pytest.mark.parametrize(("name", "side"), sweep(CASES, short=4))
+@pytest.mark.long
 def test_electrodes_of_a_sheet_keep_apart_and_leads_keep_off_their_sheet(name, side):
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))
     for _, outline, foils, cone in layers(layout):
@@ -129,6 +130,7 @@ def test_tabs_of_all_four_stick_out_at_the_chosen_side_and_keep_apart(name, side
 
 
 @pytest.mark.parametrize(("name", "side"), sweep(CASES, short=4))
+@pytest.mark.long
 def test_holes_go_through_every_layer_and_disturb_nothing(name, side):
     layout = lay_out_sheet(SHEETS[name], ElectrodePlan(wires=side))
     assert len(layout.holes) == 3

@@ -24,6 +24,7 @@ AGREE = 1e-3  # mm, the promise; the file holds 1e-5 mm
 
 
 @pytest.mark.parametrize("name", sweep(SHEETS, short=3))
+@pytest.mark.long
 def test_pdf_and_dxf_agree(name):
     sheets = cut_sheets(lay_out_sheet(SHEETS[name]), PAPER_STACK, overlap=0.0 if "disc" in name else 0.008)
     worst = 0.0
@@ -147,6 +148,7 @@ def dark_columns(row):
 
 
 @pytest.mark.parametrize("page", ["A4", *(pytest.param(page, marks=pytest.mark.long) for page in ("A3", "Letter"))])
+@pytest.mark.long
 def test_scale_bar_of_a_rendered_page_measures_100_mm(page, tmp_path):
     dpi = 600
     data = to_pdf(cut_sheets(lay_out_sheet(SHEETS["widening"]), PAPER_STACK)[:1], page)

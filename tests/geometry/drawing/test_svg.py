@@ -27,6 +27,7 @@ def matched(dxf, svg):
 
 
 @pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.long
 def test_svg_and_dxf_agree(name):
     sheets = cut_sheets(lay_out_sheet(SHEETS[name]), PAPER_STACK, overlap=0.0 if "disc" in name else 0.008, kerf=0.1e-3)
     pairs, shift = matched(read_dxf(to_dxf(sheets)), read_svg(to_svg(sheets)))

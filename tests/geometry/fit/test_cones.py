@@ -348,6 +348,7 @@ def test_a_cone_is_covered_up_to_the_smallest_radius_and_not_to_its_apex() -> No
     assert max(sheet.frustum.radius1, sheet.frustum.radius2) == pytest.approx(0.06, abs=5e-4)
 
 
+@pytest.mark.long
 def test_a_cone_is_covered_up_to_where_its_electrodes_find_room() -> None:
     body = placed(revolve([(0.0, 0.001), (0.15, 0.06)], segments=96, rings=30))
     (sheet,) = cones(body, min_arc=0.1).sheets

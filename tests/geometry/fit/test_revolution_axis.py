@@ -23,6 +23,7 @@ from .axis_cases import AXIS, BASE, hull, off
         (revolve([(0.0, 0.04), (0.1, 0.07), (0.13, 0.05), (0.3, 0.045)], rings=12), 0.01, 0.08),
     ],
 )
+@pytest.mark.long
 def test_the_revolution_axis_needs_no_profile(body: tuple[Floats, Indices], tilt: float, shift: float) -> None:
     line = _find_revolution_axis(hull(body, 48_000))  # on flat facets 6000 leave up to 0.25 mm, by where they lie
     assert line is not None

@@ -57,6 +57,7 @@ def test_the_seam_lies_behind_what_stands_out() -> None:
     assert new.rotate((0.0, 0.0, 1.0)) == pytest.approx(old.rotate((0.0, 0.0, 1.0)))
 
 
+@pytest.mark.long
 def test_a_map_of_touches_turns_the_seam_away_from_them() -> None:
     mesh = tube_with_wing(None)
     before = fitted(mesh)

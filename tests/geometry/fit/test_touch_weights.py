@@ -89,6 +89,7 @@ def test_a_convex_body_is_exposed_everywhere_and_a_corner_less() -> None:
     assert 0.1 < float((weights < 0.95).mean()) < 0.7
 
 
+@pytest.mark.long
 def test_the_floor_of_a_right_angled_groove_sees_what_the_formula_says() -> None:
     """At the middle of the floor of a long slot, w wide and d deep, the share of the sky is sin(atan(w / 2d))."""
     width, depth = 0.02, 0.02

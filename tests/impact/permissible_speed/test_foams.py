@@ -18,6 +18,7 @@ TABLE = ((1e-3, 10.0), (2e-3, 18.0), (3e-3, 36.0), (4e-3, 70.0))
 
 
 @pytest.mark.parametrize("seed", range(6))
+@pytest.mark.long
 def test_a_contact_on_a_table_is_that_of_an_integrator_that_shares_no_code(seed: int) -> None:
     chance = random.Random(seed)
     foam, _, at = random_case(chance)

@@ -133,6 +133,7 @@ def test_a_payload_makes_masses_heavier_and_the_braking_weaker() -> None:
         (SCENE[SCENE.index("[padding]") : SCENE.index("[motion]")], TEXT, "need an \\[arm\\]"),
     ],
 )
+@pytest.mark.long
 def test_a_scene_without_what_is_needed_is_refused(scene: str, limits: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         map_speeds(parse_scene(scene), _parse_limits(limits))

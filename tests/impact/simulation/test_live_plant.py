@@ -108,6 +108,7 @@ def held_up(live: Live) -> bool:
     return "behind real time" in live[2].state()["plant_lost"]
 
 
+@pytest.mark.long
 def test_a_hand_that_is_met_stops_the_arm_and_the_stop_is_measured(tmp_path: Path) -> None:
     recordings = (tmp_path / f"{number}.rec" for number in count())
 

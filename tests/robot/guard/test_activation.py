@@ -117,6 +117,7 @@ def test_a_touch_while_a_reset_settles_refuses_it():
     assert rig.names.count("activated") == 1
 
 
+@pytest.mark.long
 def test_a_fault_while_a_reset_settles_refuses_it_for_good():
     rig = reset()
     rig.run(0.02)

@@ -54,6 +54,7 @@ def test_a_controller_that_repeats_itself_is_silent():
 
 
 @pytest.mark.promise("P58")
+@pytest.mark.long
 def test_the_wall_clock_is_no_part_of_it(monkeypatch):
     """Nothing in the guard asks for the time of day: a clock that jumps by a year changes nothing."""
     import time
@@ -70,6 +71,7 @@ def test_the_wall_clock_is_no_part_of_it(monkeypatch):
     "settings",
     sweep([{"reaction": comply()}, {"reaction": SLOW}, {"external": True}]),
 )
+@pytest.mark.long
 def test_the_same_inputs_give_the_same_run_bit_by_bit(settings):
     rig = GuardRig(touch(0.5, 0.7), speed=1.0, **settings).run(1.7)
     again = make_core(

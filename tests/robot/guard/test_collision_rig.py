@@ -29,6 +29,7 @@ def collide(qd: list[float], *bodies: Body, reaction: str = "stop") -> tuple[Col
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
+@pytest.mark.long
 def test_a_bare_stop_pushes_in_by_reaction_and_braking(speed: float) -> None:
     qd = [math.copysign(speed, approach([1.0, 0, 0, 0, 0, 0])), 0, 0, 0, 0, 0]
     _, (hit,) = collide(qd, Body("one", U, PHI))

@@ -132,6 +132,7 @@ def test_a_guard_that_is_held_up_again_and_again_notices_silence():
 
 @pytest.mark.promise("P40")
 @BOTH
+@pytest.mark.long
 def test_a_process_that_waits_for_a_processor_is_no_fault_for_half_a_second(external):
     rig = GuardRig(speed=1.0, external=external).run(0.5)
     rig.companions.process_is_mute = True
@@ -257,6 +258,7 @@ def test_a_reset_while_the_driver_hangs_is_refused_with_its_name():
 
 
 @pytest.mark.promise("P62")
+@pytest.mark.long
 def test_a_reset_of_another_stop_than_the_newest_forgives_nothing():
     rig = GuardRig(touch(0.5, 0.7), touch(1.7, 1.9), reaction=Reaction(kind="stop"), speed=1.0).run(1.0)
     rig.reset()

@@ -107,6 +107,7 @@ def test_a_stop_that_does_not_show_is_followed_by_the_next_way(works):
 
 
 @pytest.mark.promise("P21")
+@pytest.mark.long
 def test_an_arm_that_nothing_stops_is_never_called_standing():
     rig = GuardRig(touch(0.5), obeys=frozenset(), speed=0.0)
     rig.run(0.3)
@@ -211,6 +212,7 @@ def test_a_latched_arm_that_nobody_sees_is_stopped_until_it_is_seen_to_stand():
 
 
 @pytest.mark.parametrize(("speed", "touched"), sweep([(0.03, False), (0.03, True), (0.3, False)]))
+@pytest.mark.long
 def test_a_latched_arm_does_not_creep(speed, touched):
     again = (touch(1.5, 9.0),) if touched else ()
     rig = GuardRig(touch(0.5, 0.7), *again, reaction=Reaction(kind="stop"), speed=1.0).run(1.6)

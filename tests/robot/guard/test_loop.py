@@ -131,6 +131,7 @@ def test_what_can_be_read_has_a_bit_each():
 
 @pytest.mark.pure  # its core is a stub
 @pytest.mark.parametrize(("gone", "seconds"), [(False, 3.0), (True, 0.8)])
+@pytest.mark.long
 def test_at_its_end_it_waits_for_the_arm_to_stand(ends, gone, seconds):
     core, now = Core(), [10.0]
     core.phase = Phase.STOPPING

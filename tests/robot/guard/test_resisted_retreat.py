@@ -84,6 +84,7 @@ class LaggingRig(CollisionRig):
 
 @pytest.mark.promise("P31")
 @pytest.mark.parametrize("kind", sweep(["retreat", "comply"]))
+@pytest.mark.long
 def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kind):
     """Up to 9.8 mm farther into a second hand before, where frames came up to 0.25 s late."""
     skin = SkinOnLink(Sensor(CONE.frustum, 0, name="one"), LINK, CONE)

@@ -128,6 +128,7 @@ def way_into(contact, q, later):
 
 
 @pytest.mark.parametrize(("on", "off"), [(0.02, 0.01), pytest.param(0.05, 0.03, marks=pytest.mark.long)])
+@pytest.mark.long
 def test_a_touch_that_flickers_is_pressed_no_farther_than_a_steady_one(on, off):
     """4.5 to 9 mm before, each flicker being a new touch with a way of its own."""
     flicker = [touch(1.0 + (on + off) * n, 1.0 + (on + off) * n + on) for n in range(int(1.0 / (on + off)))]

@@ -44,6 +44,7 @@ def test_a_long_program_is_translated_and_its_error_has_its_line(translator: Com
     assert problem.line == _IN_PLACE_LENGTH // 8 + 2
 
 
+@pytest.mark.long
 def test_a_translator_that_hangs_is_ended_and_another_started(
     translator: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -152,6 +152,7 @@ def test_the_slider_scales_speed_and_a_stop_does_not_wait_for_it() -> None:
 
 @pytest.mark.parametrize("joint", range(6))
 @pytest.mark.parametrize("speed", [1.5, -1.5, 0.4, -0.4])
+@pytest.mark.long
 def test_a_joint_limit_stops_the_arm_before_it_is_passed(joint: int, speed: float) -> None:
     sign = math.copysign(1.0, speed)
     limit = (ARM.joint_upper if sign > 0 else ARM.joint_lower)[joint]

@@ -186,6 +186,7 @@ def test_the_primary_interface_tells_of_a_program_and_of_its_mistake() -> None:
         assert sum(kind == 16 for kind, _ in packets) == 3  # and ten more a second
 
 
+@pytest.mark.long
 def test_the_secondary_interface_sends_the_state_alone_and_the_realtime_one_each_cycle() -> None:
     with Server(Controller(Options()), free_host()) as server:
         with socket.socket() as secondary, socket.socket() as realtime:
@@ -302,6 +303,7 @@ def test_what_is_switched_off_or_not_there_takes_no_connection(options: dict[str
                 socket.create_connection((server.host, port), 60.0)
 
 
+@pytest.mark.long
 def test_a_controller_that_was_frozen_has_lost_cycles_and_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """A client would else take every later state for a late one."""
     now = [100.0]

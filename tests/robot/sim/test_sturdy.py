@@ -229,6 +229,7 @@ def test_one_that_is_seldom_sent_something_has_ten_seconds_to_read_it(
 
 
 @pytest.mark.skipif(not hasattr(socket, "TCP_USER_TIMEOUT"), reason="an option of Linux")
+@pytest.mark.long
 def test_one_that_acknowledges_nothing_any_more_gives_its_inputs_back(
     server: Server, monkeypatch: pytest.MonkeyPatch
 ) -> None:

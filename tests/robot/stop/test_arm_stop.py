@@ -16,6 +16,7 @@ from tests.support.guard_rig import GuardRig, touch
 @pytest.mark.parametrize(
     ("lost", "first"), [("program", StopPath.COMMAND), ("command", StopPath.PROGRAM), ("watchdog", StopPath.PROGRAM)]
 )
+@pytest.mark.long
 def test_a_way_that_is_lost_is_not_tried(lost, first):
     rig = GuardRig(external=True, speed=1.0).run(0.5)
     rig.feed(BlockKind.LOST, f"{lost}\nit is gone".encode())
@@ -75,6 +76,7 @@ def test_a_latched_arm_that_a_program_moves_is_stopped_again(external):
 
 
 @pytest.mark.promise("P22")
+@pytest.mark.long
 def test_an_externally_controlled_arm_is_latched_at_the_end_of_a_watch():
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0).run(1.2)
     standing = rig.event("standstill").time
@@ -153,6 +155,7 @@ def test_a_protective_stop_that_never_shows_is_said():
 
 
 @pytest.mark.promise("P29")
+@pytest.mark.long
 def test_a_slider_at_0_is_put_back_by_a_reset_and_by_nothing_else():
     obeys = frozenset({StopPath.SLIDER})
     rig = GuardRig(touch(0.5, 0.7), reaction=Reaction(kind="stop"), external=True, speed=1.0, obeys=obeys)

@@ -145,6 +145,7 @@ def test_a_stop_has_the_time_that_the_motors_take(world, monkeypatch, held, budg
     assert made[-1][4] == pytest.approx(budget)
 
 
+@pytest.mark.long
 def test_while_the_arm_moves_it_is_not_given_up_and_a_protective_stop_is_left_to_work(world):
     end = 60.0
     assert stop(holding(world), over=lambda: world.now > end) is False

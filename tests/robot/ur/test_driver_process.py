@@ -61,18 +61,34 @@ _MEANWHILE = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (ValueError("The value is not within [0;3.14]"), "ValueError: moveJ: The value is not within [0;3.14]"),
+        (RuntimeError("no answer"), "RobotConnectionError: moveJ: no answer"),
+    ],
+)
+def test_what_the_wheel_raises_is_told_with_the_call_that_raised_it(driver, error, why):
+    served, made, guard, program = driver
+    made.control.moveJ = fail(error)
+    guard.send(Release(7).encode())
+    move(program)
+    served.poll(0.0)
+    assert answers(program) == [{"number": 1, "ok": False, "stopped": False, "why": why}]
+
+
+def fail(error):
+    def call(*_):
+        raise error
+
+    return call
+
+
 @pytest.mark.parametrize("meanwhile", [None, *_MEANWHILE], ids=lambda request: request and request["do"])
 @pytest.mark.parametrize("end", ["program", "stop that fails", "value that the wheel refuses"])
 def test_no_move_that_something_has_ended_is_told_to_have_arrived(driver, meanwhile, end):
     """Whatever another thread of the program asks for when that is found."""
     served, made, guard, program = driver
-
-    def fail(error):
-        def call(*_):
-            raise error
-
-        return call
-
     guard.send(Release(7).encode())
     move(program)
     served.poll(0.0)

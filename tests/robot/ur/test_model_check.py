@@ -67,6 +67,7 @@ def test_an_unknown_arm_fits_no_model():
         check_model(arm_model("UR5e"), _ArmPose(Q, (3.0, 0.0, 0.0, 0.0, 0.0, 0.0), NONE), "host")
 
 
+@pytest.mark.long
 def test_the_simulated_controller_is_asked():
     with served(model="ur10e", start_q=Q) as simulated:
         pose = read_pose(simulated.host, 30.0)

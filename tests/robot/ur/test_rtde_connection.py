@@ -173,6 +173,7 @@ def test_nonsense_on_the_primary_interface_is_no_error(data):
     assert len(stops._rest) <= len(data)
 
 
+@pytest.mark.long
 def test_a_program_that_is_not_seen_to_run_proves_no_stop(controller, monkeypatch):
     """The dashboard answers, and the script port swallows what it is sent, as a read-only one does."""
     monkeypatch.setattr(StopSockets, "run", lambda *_: True)

@@ -130,6 +130,7 @@ def test_marks_that_would_hide_each_other_share_a_label(run: Run, tmp_path: Path
         ("folder.png", r"cannot be written to .*: Is a directory; name another file"),
     ],
 )
+@pytest.mark.long
 def test_a_file_that_cannot_be_is_refused(run: Run, tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / "folder.png").mkdir()
     with pytest.raises(RecordingError, match=words):

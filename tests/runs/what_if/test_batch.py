@@ -140,6 +140,7 @@ def test_no_jobs_are_refused(runs: list[Path]) -> None:
         judge_runs(runs, jobs=0)
 
 
+@pytest.mark.long
 def test_a_setting_that_cannot_be_is_an_error_of_its_variant_alone(runs: list[Path]) -> None:
     good, bad = judge_runs(runs[:1], ({}, {"reaction.kind": "dance"}))
     assert not good["error"]

@@ -83,6 +83,7 @@ DAMAGED = [
 
 
 @pytest.mark.parametrize("facts", DAMAGED, ids=range(len(DAMAGED)))
+@pytest.mark.long
 def test_a_damaged_word_about_touches_is_refused(collision: Run, facts: Any) -> None:
     with pytest.raises(RecordingError, match="does not say what touched the skin"):
         _true_touches(told(collision, facts))

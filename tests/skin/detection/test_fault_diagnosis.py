@@ -140,6 +140,7 @@ def test_a_wire_that_is_mended_and_another_that_breaks_are_two_faults():
     assert not any(isinstance(event, TouchBegan) for event in events)
 
 
+@pytest.mark.long
 def test_a_gain_that_is_off_is_not_taken_for_a_broken_wire():
     rng = random.Random(4)
     for electrode in "ABCD":

@@ -260,6 +260,7 @@ def test_every_fault_has_a_sentence_of_its_own():
 
 
 @pytest.mark.parametrize(("electrode", "sheet"), [("A", "AB"), ("B", "AB"), ("C", "CD"), ("D", "CD")])
+@pytest.mark.long
 def test_a_wire_that_is_fed_from_elsewhere_is_named_by_its_own_sheet(electrode, sheet):
     """Through a firm contact it takes the current of both phases; the sheet that has less of its own is the one."""
     names = {f"OPEN_{each}" for each in (*sheet, {"AB": "UPPER", "CD": "LOWER"}[sheet])}

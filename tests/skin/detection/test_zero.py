@@ -125,6 +125,7 @@ def test_an_offset_that_parts_may_have_is_no_leak_of_a_low_ring(millivolts):
 
 
 @pytest.mark.parametrize("rate", [-0.8, 0.8])
+@pytest.mark.long
 def test_learned_currents_go_with_a_zero_that_creeps(rate):
     """After a touch of seconds it is off by counts, and the small current of a slender sheet was called changed."""
     plain = Sensor(Frustum(0.02, 0.02, 0.6, math.radians(340)))

@@ -167,6 +167,7 @@ def test_a_current_at_full_scale_is_a_short_with_a_scene_and_without() -> None:
         assert said in found.value
 
 
+@pytest.mark.long
 def test_a_current_at_full_scale_of_a_sensor_that_is_touched_may_be_the_touches() -> None:
     """Two firm contacts far apart join most of a sheet by the other one, though the wire of A is open."""
     for opened in ((), ("A",)):

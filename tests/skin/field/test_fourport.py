@@ -106,6 +106,7 @@ def test_bad_electronics_are_refused(make, message) -> None:
 @pytest.mark.parametrize("resistance", [1e3, 1e16, math.inf])
 @pytest.mark.parametrize("conductance", [0.0, 1e-14, 1e3])
 @pytest.mark.parametrize("phase", [radial_phase, angular_phase, touch_phase])
+@pytest.mark.long
 def test_inputs_of_any_resistance_keep_their_digits(phase, conductance: float, resistance: float) -> None:
     """At 1e16 ohm and without contact the elimination was singular."""
     if math.isinf(resistance) and conductance == 0.0:

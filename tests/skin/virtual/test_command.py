@@ -137,6 +137,7 @@ def test_a_mistake_is_one_line_of_usage(capsys):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
+@pytest.mark.long
 def test_the_program_on_a_port_is_touched_as_its_script_says(tmp_path):
     link = tmp_path / "skin"
     words = [*CONE, "--touch", "0.15:0.25:50:90", "--duration-s", "0.3", "--link", str(link), "--json"]

@@ -152,6 +152,7 @@ def test_bad_values_are_refused(make, message) -> None:
         make()
 
 
+@pytest.mark.long
 def test_a_virtual_skin_starts_without_scipy():
     """Its import took longer than everything else between ``guard(scene)`` and an active guard."""
     code = "import sys, coneskin.skin.virtual.field_contacts; sys.exit('scipy' in sys.modules)"

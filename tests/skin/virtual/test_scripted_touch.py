@@ -142,6 +142,7 @@ def opposite(touch, **changes):
     ],
     ids=["palm", "uneven grip", "clamp", "fingers"],
 )
+@pytest.mark.long
 def test_no_place_of_several_contacts_is_certain(shape):
     found = read(FOREARM, shape)
     assert len(found) > 120

@@ -38,6 +38,7 @@ def side_of(section: Section, tolerance: float = 1e-3):
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.05, 1.5, 2.0])
+@pytest.mark.long
 def test_the_arc_of_an_ellipse_is_the_elliptic_integral(ratio: float) -> None:
     """An independent perimeter; the strips of 2 pi / 64 miss the curve by their width to the fourth."""
     a, b = 0.05 * ratio, 0.05
@@ -45,6 +46,7 @@ def test_the_arc_of_an_ellipse_is_the_elliptic_integral(ratio: float) -> None:
     assert arc == pytest.approx(4.0 * a * ellipe(1.0 - (b / a) ** 2), rel=1e-7 if ratio < 2.0 else 1e-6)
 
 
+@pytest.mark.long
 def test_an_ellipse_becomes_the_circle_at_the_square_of_its_excess() -> None:
     """Half axes r (1 +- e) have the arc 2 pi r (1 + e^2 / 4 + ...): Ramanujan's series."""
     excess = {

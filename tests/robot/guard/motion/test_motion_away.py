@@ -59,6 +59,7 @@ def test_a_harder_rule_ends_it():
 @pytest.mark.parametrize(
     ("kind", "held", "expected"), [("retreat", 2.0, 2.0), ("comply", 2.0, 2.0), ("retreat", 9.0, 4.0)]
 )
+@pytest.mark.long
 def test_a_motion_away_brakes_no_harder_than_the_motors_hold(kind, held, expected):
     reaction = comply() if kind == "comply" else Reaction(kind="retreat")
     rig = GuardRig(touch(0.5, 1.5), reaction=reaction, speed=0.5)
@@ -98,6 +99,7 @@ def test_an_arm_that_moves_while_it_waits_is_stopped():
     assert "something moved the arm" in [e for e in rig.events if e.name == "stopping"][1].details["why"]
 
 
+@pytest.mark.long
 def test_a_external_arm_is_stopped_by_script_and_follows():
     wide = Reaction(kind="retreat", arm_distance=0.5)
     rig = GuardRig(touch(0.5, 0.9), reaction=wide, external=True, speed=1.0).run(0.45)
@@ -121,6 +123,7 @@ def test_a_external_arm_is_stopped_by_script_and_follows():
     assert rig.core.phase is Phase.LATCHED
 
 
+@pytest.mark.long
 def test_a_program_that_does_not_start_is_not_waited_for():
     rig = GuardRig(touch(0.5, 0.7), external=True, speed=1.0)
     take = rig.arm.feed
@@ -136,6 +139,7 @@ def test_a_program_that_does_not_start_is_not_waited_for():
 
 @pytest.mark.promise("P30")
 @pytest.mark.parametrize("external", [False, True])
+@pytest.mark.long
 def test_an_arm_that_something_else_moves_is_not_left_to_it(external):
     """A person starts a program while the arm moves away: it replaces ours."""
     rig = GuardRig(touch(0.5, 0.7), external=external, speed=1.0).run(0.75)
@@ -177,6 +181,7 @@ def test_a_fault_ends_a_external_retreat():
 
 
 @pytest.mark.parametrize("acceleration", [0.1, 4.0])
+@pytest.mark.long
 def test_something_faster_than_it_was_told_is_not_waited_for(acceleration):
     reaction = Reaction(kind="retreat", acceleration=acceleration, time_budget=30.0)
     rig = GuardRig(touch(0.5, 0.7), reaction=reaction, external=True, speed=1.0).run(0.75)

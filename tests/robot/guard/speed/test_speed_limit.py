@@ -202,6 +202,7 @@ def test_the_slider_goes_up_again_after_a_while_of_slower_motion_but_not_beyond_
 
 
 @pytest.mark.parametrize(("speed", "moves"), [(0.0, False), (0.018, False), (0.025, True)])
+@pytest.mark.long
 def test_a_standing_arm_keeps_the_slider_where_it_is(speed: float, moves: bool) -> None:
     """Otherwise each start of a program would begin too fast. Below 0.02 rad/s it stands."""
     loop = Loop().run(1.0, speed=1.0)
@@ -333,6 +334,7 @@ def test_at_its_end_the_slider_is_where_it_was_found() -> None:
 
 
 @pytest.mark.parametrize("slider", [0.0, 0.35, 0.7, None])
+@pytest.mark.long
 def test_at_its_end_a_slider_that_something_else_has_moved_stays_there(slider: float | None) -> None:
     loop = Loop().run(2.0, speed=1.0)
     assert 0.1 < loop.arm.slider < 0.3

@@ -128,6 +128,7 @@ def test_optimove_goes_at_shares_of_what_the_joints_can_do() -> None:
 
 
 @pytest.mark.parametrize("slider", [1.0, 0.5, 0.3, 0.25])
+@pytest.mark.long
 def test_speeds_for_each_cycle_go_their_whole_way_at_any_slider(bench: Bench, slider: float) -> None:
     """As a trajectory of Universal Robots' driver: 0.2 (1 - cos(pi t)) rad in 2 s of its own time."""
     bench.send(

@@ -150,6 +150,7 @@ def test_a_certain_place_stays_certain_while_nothing_changes():
 @pytest.mark.promise("P02")
 @pytest.mark.parametrize("kind", ["over the seam", "grip", "clamp", "fingers"])
 @pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.long
 def test_a_certain_place_is_never_far_from_a_contact(shape, kind):
     sensor, rng = Sensor(SHAPES[shape]), random.Random(2)
     for seed in range(6):
@@ -239,6 +240,7 @@ def test_a_certain_place_is_never_far_from_a_contact_in_many_presses(model, kind
 
 @pytest.mark.parametrize("radial", ["A", "B"])
 @pytest.mark.parametrize("angular", ["C", "D"])
+@pytest.mark.long
 def test_every_polarity_tells_one_contact_from_two(radial, angular):
     sensor = Sensor(FOREARM, polarity=Polarity(radial, angular))
     one = [pressed(0.06, 1.0, 20.0, 0.012)]

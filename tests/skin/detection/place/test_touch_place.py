@@ -172,6 +172,7 @@ def test_a_centre_far_off_the_sheet_has_a_finite_velocity():
 
 
 @pytest.mark.parametrize(("radial", "angular", "certain"), [(1.0, 1.0, True), (0.97, 1.0, False), (1.0, 0.97, False)])
+@pytest.mark.long
 def test_no_place_is_certain_once_a_sheet_has_changed(radial, angular, certain):
     """An electrode of which a part peels off moves every place: the currents that are learned anew do not tell it."""
     detector, rng = Detector(SENSOR), random.Random(5)
