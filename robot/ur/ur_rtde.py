@@ -175,8 +175,8 @@ class UrArm:
             RobotRefused: the controller does not start it.
         """
         with _rtde_errors("starting the control program again"):
-            if self.control.isProgramRunning():
-                return
+            if self.control.isProgramRunning() and self._set_watchdog():
+                return  # the wheel may know of an end a state later: a program that takes a command runs
             self.mode = Mode.IDLE
             self.control.kickWatchdog()
             time.sleep(_REGISTER_DELAY)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 
+import numpy as np
 import pytest
 
 from coneskin.cli import main
@@ -29,9 +30,25 @@ def test_every_picture_is_drawn(cone: list[str], tmp_path, monkeypatch: pytest.M
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(pictures, "_GRID_COUNT", 21)
     monkeypatch.setattr(pictures, "_LINE_STEPS", 12)
+    figures, painted, make, paint = [], [], pictures.make_figure, pictures.paint_error
+
+    def make_figure(*values):
+        figures.append((made := make(*values))[0])
+        return made
+
+    monkeypatch.setattr(pictures, "make_figure", make_figure)
+    monkeypatch.setattr(pictures, "paint_error", lambda *values: painted.append(values) or paint(*values))
     assert main(["field", *cone, "-o", str(tmp_path / "new"), "--grid", "4"]) == 0
     names = sorted(path.name for path in (tmp_path / "new").iterdir())
     assert names == ["error_phi.png", "error_u.png", "potential_angular.png", "potential_radial.png"]
+    for sheet, u, phi, error, _ in painted:
+        assert u[0] + u[-1] == pytest.approx(sheet.width)
+        assert phi[0] + phi[-1] == pytest.approx(sheet.wrap)
+        assert np.isfinite(error).all()
+    scales = [figure.axes[1] for figure in figures if len(figure.axes) > 1 and "V" in figure.axes[1].get_ylabel()]
+    assert len(scales) == 2
+    for scale in scales:
+        assert scale.get_yticks() == pytest.approx(np.linspace(*scale.get_ylim(), 6), abs=1e-9)
 
 
 def test_a_mistake_is_named_without_a_traceback(

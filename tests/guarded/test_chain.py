@@ -78,6 +78,7 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
     path = tmp_path / "run.rec"
     with guard(scene_for(controller), recording=path) as session:
         assert_short_slices(session, "guard", "driver")
+        assert session.latched_stop == 0
         thread, raised = run_until_moving(controller, session)
         session.touch(0.13, 1.55, duration=0.2)
         thread.join(DEADLINE)
@@ -87,6 +88,7 @@ def test_a_touch_raises_in_the_program_and_a_person_lets_it_go_on(controller, tm
             session.arm.move_j(FAR)
         assert session.wait_for(("touch_ended",), DEADLINE) is not None
         until(lambda: is_reset(session))
+        assert session.latched_stop == 1
         session.arm.move_j(START, speed=1.0, acceleration=4.0)
         assert controller.state()["q"] == pytest.approx(START, abs=1e-3)
     run = read_run(path)

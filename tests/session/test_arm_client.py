@@ -1,5 +1,6 @@
 """Requests of several threads over one channel: each gets its own answer, whoever has read it."""
 
+import math
 import threading
 
 import pytest
@@ -21,11 +22,9 @@ def ends():
 
 def asked(driver):
     """The next request that has come, and the number that it has."""
-    while True:
-        wait_readable([driver], 5.0)
-        if messages := driver.receive():
-            assert len(messages) == 1
-            return decode_json(messages[0])
+    wait_readable([driver], 60.0)
+    (message,) = driver.receive()
+    return decode_json(message)
 
 
 def answer(driver, number, **values):
@@ -157,6 +156,20 @@ def test_a_way_point_may_be_slow_and_the_last_has_no_blend(ends) -> None:
     answer(driver, request["number"])
     thread.join(60.0)
     assert [point[-1] for point in request["waypoints"]] == [0.1, 0.0]
+
+
+def test_a_payload_is_a_mass_and_its_centre(ends) -> None:
+    program, driver = ends
+    arm = ArmClient(program, lambda stopped: None, arm_model("UR5e"), "nowhere")
+    for wrong in ((-0.1,), (math.nan,), (1.0, (0.0, 0.0)), (1.0, (0.0, 0.0, math.inf))):
+        with pytest.raises(KinematicsError, match="a payload is a mass from 0 kg on"):
+            arm.set_payload(*wrong)
+    assert driver.receive() == []
+    thread = call(lambda: arm.set_payload(0, [0.0, 0.01, 0.05]), [])
+    request = asked(driver)
+    answer(driver, request["number"])
+    thread.join(60.0)
+    assert (request["do"], request["mass"], request["centre"]) == ("set_payload", 0.0, [0.0, 0.01, 0.05])
 
 
 def test_a_request_that_is_too_long_is_refused_and_not_waited_for(ends) -> None:

@@ -1,17 +1,21 @@
 """A commissioning with the process of a virtual skin: a right one passes, a wrong one is named; the command itself."""
 
 import json
+import socket
+import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from coneskin.cli import main
-from coneskin.commissioning.acceptance.commission import Commissioner, commission_virtual_skin
+from coneskin.commissioning.acceptance.commission import Commissioner, _ArmWatch, commission_virtual_skin
 from coneskin.commissioning.skin_watch import TouchSession
-from coneskin.core.errors import SkinConnectionError
+from coneskin.core.errors import RobotError, SkinConnectionError
+from coneskin.robot.sim.process import SimulatedController, free_host
 from coneskin.scene.reader import load_scene, parse_scene
 from coneskin.scene.values.scene import Scene
-from tests.support.scenes import forearm_scene
+from tests.support.scenes import START, forearm_scene
 
 TEXT = forearm_scene(reaction='kind = "retreat"').replace("[[link.sensor]]", '[[link.sensor]]\nname = "forearm skin"')
 Output = pytest.CaptureFixture[str]
@@ -43,6 +47,37 @@ def test_a_right_skin_passes_and_the_record_is_valid(tmp_path: Path, capsys: Out
     assert "wrist 3" in lines[-1]["no_skin_on"]
     assert main(["doctor", str(path), "--check", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["commissioning"].endswith("by a test, 5 marks")
+
+
+@pytest.mark.long
+@pytest.mark.processes
+@pytest.mark.parametrize(
+    ("happens", "words"),
+    [
+        (f"def nudge():\n  movej({[*START[:5], START[5] + 0.03]})\nend\n", "the arm has moved, a joint by 0.0"),
+        ("rtde silent", "the controller has sent no state for 1 s"),
+    ],
+)
+def test_the_arm_has_to_stay_where_the_marks_were_described(happens: str, words: str) -> None:
+    with SimulatedController("UR5e", free_host(), START) as controller, ExitStack() as stack:
+        watch = _ArmWatch(parse_scene(forearm_scene(controller.host, "external")).arm, stack)
+        assert watch.q == pytest.approx(START)
+        watch.check()
+        if happens.startswith("def"):
+            with socket.create_connection((controller.host, 30002), 60.0) as script:
+                script.sendall(happens.encode())
+                script.shutdown(socket.SHUT_WR)
+                while script.recv(65536):
+                    pass
+        else:
+            controller.call(happens)
+        end, said = time.monotonic() + 60.0, ""
+        while not said and time.monotonic() < end:
+            try:
+                watch.check()
+            except RobotError as exc:
+                said = str(exc)
+        assert said.startswith(words), said
 
 
 @pytest.mark.long

@@ -100,6 +100,14 @@ def test_the_lag_is_what_six_joints_on_their_servos_overshoot_by_beyond_one() ->
             assert TURN**2 * found >= (lag + float(lever @ direction)) * (1.0 - 1e-4)
 
 
+def test_a_delay_is_that_of_a_critically_damped_servo_and_of_a_long_braking() -> None:
+    """At w = 20 rad/s a blow of 1 rad/s moves the servo by 1 / (20 e) rad; 2 rad/s^2 for long, by 2 / 20^2 rad."""
+    way = ExtraWay(3.0)
+    assert way.delay(0.5, 0.25, 1e9, 20.0) == pytest.approx(3.0 / (20.0 * math.e * 0.25), rel=1e-12)
+    assert way.delay(0.5, 0.25, 2.0, 20.0) == pytest.approx(3.0 * 2.0 / 400.0 / 0.5, rel=1e-12)
+    assert way.delay(0.0, 0.25, 2.0, 20.0) == 0.0
+
+
 @pytest.mark.long
 def test_a_delay_makes_up_for_the_lag_also_of_a_short_braking() -> None:
     """What six joints overshoot by is at most what one does, and the way of the delay; but for what they swing."""

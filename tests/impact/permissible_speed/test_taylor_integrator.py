@@ -88,6 +88,7 @@ def test_energy_and_momentum_are_kept_without_damping(
 @given(speed=st.floats(0.01, 5.0), arm=st.floats(0.1, 100.0), body=st.floats(0.1, 100.0))
 def test_without_damping_the_way_out_is_the_way_in_backwards(speed: float, arm: float, body: float) -> None:
     course = integrate(model(speed, arm, body), 0.5)
+    assert course.force(-1e-9) == course.force(course.end + 1e-9) == 0.0
     for since in (0.1, 0.4, 0.9):
         t = since * course.peak_time
         assert course.force(course.peak_time + t) == pytest.approx(course.force(course.peak_time - t), rel=1e-6)

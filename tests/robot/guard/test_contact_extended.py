@@ -1,11 +1,12 @@
 """What is not one disc: its centroid and the line of its contacts, once for each touch; never two invented points."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from coneskin.robot.reaction.types import Reaction
-from tests.support.guard_rig import CONE, GuardRig, touch
+from tests.support.guard_rig import CONE, GuardRig, felt, touch
 
 
 def pressed(*touches):
@@ -27,6 +28,20 @@ def test_two_hands_are_a_centroid_and_a_line():
     way = [b - a for a, b in zip(CONE.point(0.09, 2.0), ahead, strict=True)]
     cosine = sum(a * b for a, b in zip(way, line, strict=True)) / math.hypot(*way) / half
     assert abs(cosine) > 0.999
+
+
+def test_the_half_axes_of_the_ellipse_are_those_of_the_covariance():
+    """With 95 % of a plane's normal distribution in it: the axes' outer products are 5.991 times the covariance."""
+    uu, us, ss = 4e-6, 1.5e-6, 1e-6
+    contact = felt(0.5)
+    contact = replace(contact, touch=contact.touch._replace(covariance=(uu, us, ss)))
+    half_axes = contact.details()["ellipse"]
+    along, around = contact._axes(CONE.point(0.13, 1.57))
+    parts = [[sum(a * b for a, b in zip(axis, way, strict=True)) for way in (along, around)] for axis in half_axes]
+    (a, b), (c, d) = parts
+    found = [a * a + c * c, a * b + c * d, b * b + d * d]
+    assert found == pytest.approx([5.991464547 * value for value in (uu, us, ss)], rel=1e-4)
+    assert math.hypot(a, b) > math.hypot(c, d)
 
 
 @pytest.mark.long

@@ -275,7 +275,7 @@ def test_it_ends_on_request_and_first_limits_its_own_end(driver):
     served.poll(0.0)
     served.end()
     served.run()
-    assert order == [["moveJ", "kick"]]  # before the stop, which may block for minutes
+    assert order == [["setWatchdog", "moveJ", "kick"]]  # before the stop, which may block for minutes
     assert stops(made.control)[-1] == "stopJ"
 
 
@@ -373,6 +373,7 @@ def test_a_stop_that_the_program_asks_for_is_not_ended_by_the_watchdog_and_one_o
     """At 3 rad/s it takes 0.3 s and more, in which nothing kicks: the program ended, and that was a fault."""
     served, made, guard, program = driver
     guard.send(Release(7).encode())
+    served.poll(0.0)
     for number, end in enumerate(
         ({"do": "stop", "acceleration": 2.0}, {"do": "servo_j", "q": [0.0] * 6, "duration": 1.0})
     ):

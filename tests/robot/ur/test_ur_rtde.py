@@ -71,6 +71,15 @@ def test_a_program_that_starts_some_looks_after_its_upload_is_waited_for(monkeyp
     assert [call[0] for call in a.control.calls] == ["kick", "reuploadScript", *["setWatchdog"] * runs]
 
 
+def test_a_program_that_the_wheel_still_takes_to_run_starts_again_where_it_takes_no_command():
+    """Its states come a moment late, later on a busy computer: a reset right after a stop left nothing running."""
+    a = arm()
+    taken = iter([False, True])
+    a.control.setWatchdog = lambda frequency: a.control._note("setWatchdog", frequency) and next(taken)
+    a.revive()
+    assert [call[0] for call in a.control.calls] == ["setWatchdog", "kick", "reuploadScript", "setWatchdog"]
+
+
 def test_what_the_wheel_refuses_is_an_error():
     a = arm(accepts=False)
     with pytest.raises(RobotRefused, match="did not take moveJ: its program is not running"):
