@@ -163,7 +163,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
     guard.send(Release(7).encode())
     path(program)
     served.poll(0.0)
-    assert [call[0] for call in made.control.calls] == ["movePath", "setWatchdog", "kick"]
+    assert [call[0] for call in made.control.calls] == ["setWatchdog", "movePath", "setWatchdog", "kick"]
     (_, *entries), _ = made.control.calls[-3:-1]
     assert entries == [
         ("movej", "joints", [1.05, 1.4, 0.02]),
@@ -180,6 +180,7 @@ def test_a_path_is_announced_before_its_program_starts_anew_and_gets_a_watchdog_
 def test_a_path_that_gets_no_watchdog_is_stopped_and_not_reported_as_restarted(driver):
     served, made, guard, program = driver
     guard.send(Release(7).encode())
+    served.poll(0.0)
     made.control.setWatchdog = lambda frequency: False
     path(program)
     served.poll(0.0)
