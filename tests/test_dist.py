@@ -155,7 +155,8 @@ def test_readmes_first_program_runs_from_the_wheel_in_an_empty_folder(installed:
     program = next(block for block in blocks(ROOT / "README.md") if block.language == "python")
     (tmp_path / "program.py").write_text(PageRun(tmp_path).adapt(program.text), encoding="utf-8")
     said = run(installed / "python", "program.py", cwd=tmp_path)
-    assert "on the forearm was touched at u = 130" in said
+    (u_mm,) = re.findall(r"on the forearm was touched at u = ([0-9.]+) mm", said)
+    assert float(u_mm) == pytest.approx(130.0, abs=0.5)  # which samples of the noise it is of depends on the clock
     assert "same decisions, bit by bit: True" in said
 
 
