@@ -40,7 +40,7 @@ def test_a_process_its_later_threads_and_its_children_have_short_ones_and_the_ni
     done = subprocess.run([sys.executable, "-c", _PROGRAM], capture_output=True, text=True, timeout=60, check=True)
     before, own, thread, nice, child = (int(line.split()[-1]) for line in done.stdout.splitlines())
     assert own == thread == child == 100_000 < before
-    assert nice == os.nice(0) + 3
+    assert nice == min(os.nice(0) + 3, 19)  # 19 is the largest there is
 
 
 @told_by_kernel
