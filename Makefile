@@ -67,7 +67,7 @@ $(VENV)/%.stamp: $(VENV)/bin/python pyproject.toml setup.py
 	@echo "installing coneskin[$(extras)]"
 	@index="$${UV_DEFAULT_INDEX:-$${PIP_INDEX_URL:-$$($(BIN)/python -m pip config get global.index-url 2>/dev/null)}}"; \
 		[ -z "$$index" ] || export UV_DEFAULT_INDEX="$$index"; \
-		$(BIN)/python -m pip install -q uv && $(BIN)/python -m uv pip install -q -p $(BIN)/python -e '.[$(extras)]' || \
+		$(BIN)/python -m pip install -q uv && $(BIN)/python -m uv pip install -q --compile-bytecode -p $(BIN)/python -e '.[$(extras)]' || \
 		$(BIN)/python -m pip install -q -e '.[$(extras)]'
 	@touch $@ $(more)
 
