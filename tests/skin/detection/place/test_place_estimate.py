@@ -93,3 +93,28 @@ def test_a_bonded_contact_has_no_area_error(shape, bits, most):
     """At 15 mm the electrical centre is off by 1.1 mm."""
     found = errors(shape, bits, 0.015, math.inf, 0.0, 60)
     assert math.sqrt(sum(e for e, *_ in found) / len(found)) < most
+
+
+@pytest.mark.parametrize(("along", "around"), [(0.006, 0.0), (0.0, 0.006)])
+def test_a_long_contact_at_an_edge_is_found_at_its_middle(along, around):
+    """Two discs in a row count more in one direction: what that adds to one entry, it takes from the other."""
+    cone = SHAPES["forearm"]
+    parts = Electronics(adc_bits=16, current_full_scale=0.0058)
+    sensor = Sensor(cone, upper_sheet_ohms=OHMS, lower_sheet_ohms=OHMS, electronics=parts, tolerance=IDEAL_SHEETS)
+    model, inversion = FieldModel(SectorSheet.of_frustum(cone), OHMS, OHMS, 1e-7), FrameInversion(sensor)
+    estimator = PlaceEstimator(sensor)
+    volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
+    for u, phi in ((0.02, 0.5), (0.02, 3.0), (0.22, 5.6)):
+        turn = around / cone.radius_at(u)
+        scene = model.contacts([[u - along, u + along]], [[phi - turn, phi + turn]], 0.004)
+        y = model.admittance(scene)[0].tolist()
+        counts = {
+            name: round(value * (ampere if name.endswith("current") else volt))
+            for name, value in measure(sensor, (y, y, y))._asdict().items()
+        }
+        frame = Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
+        matrix = inversion.invert(frame[6:18])
+        assert matrix is not None
+        one = FrameNoise(sensor).of(matrix, frame, NOISE**2 + 1.0 / 12.0)
+        place = estimator.estimate(matrix, one, 1.0, SheetConductances(*estimator.sheets, 0.0, 0.0))
+        assert math.hypot(place.u - u, cone.radius_at(u) * (place.phi - phi)) < 0.06e-3  # 0.03 mm; counted twice: 0.2
