@@ -17,15 +17,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 _TASKS = Path("/proc/self/task")  # Linux; elsewhere only threads are looked at
 _HERE = Path(__file__).parent
 _WITH_PROCESSES = (  # tests that take turns with a few others; below this folder
-    *(
-        "guarded",
-        "robot/sim/test_command.py",
-        "robot/sim/test_wheel.py",
-        "test_demos.py",
-        "test_notebook.py",
-        "test_measure_controller.py",
-    ),
-    *("impact/simulation/test_live_plant.py", "robot/ur/test_program_io.py"),
+    "guarded",
+    "impact/simulation/test_live_plant.py",
+    "robot/sim/test_command.py",
+    "robot/sim/test_wheel.py",
+    "robot/ur/test_program_io.py",
+    "test_demo_arms.py",
+    "test_demos.py",
+    "test_measure_controller.py",
+    "test_notebook.py",
 )
 _OUTCOMES = ("passed", "failed", "error", "xfailed", "xpassed", "skipped")  # as pytest names them
 _SHORT = "not long"  # the marker expression of the short run, as in pyproject.toml

@@ -139,6 +139,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory, wheel: Path) -> Path:
     return environment(tmp_path_factory.mktemp("user") / "venv", wheel)
 
 
+@pytest.mark.processes
 def test_the_installed_wheel_runs_without_the_tree(installed: Path, tmp_path: Path) -> None:
     programs = installed
     assert run(programs / "coneskin", "--version", cwd=tmp_path) == f"coneskin {coneskin.__version__} (pure)\n"
@@ -149,6 +150,7 @@ def test_the_installed_wheel_runs_without_the_tree(installed: Path, tmp_path: Pa
         assert "bit by bit" in run(programs / "coneskin", "demo", cwd=tmp_path)
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere 127.0.0.1 is the only such address")
 @pytest.mark.skipif(find_spec("rtde_control") is None, reason="the ur_rtde wheel is not installed")
 def test_readmes_first_program_runs_from_the_wheel_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
@@ -160,6 +162,7 @@ def test_readmes_first_program_runs_from_the_wheel_in_an_empty_folder(installed:
     assert "same decisions, bit by bit: True" in said
 
 
+@pytest.mark.processes
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere 127.0.0.1 is the only such address")
 def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tmp_path: Path) -> None:
     """It answers on each of its ports, and none of the extras' packages is there."""
@@ -188,7 +191,7 @@ def test_the_simulated_controller_comes_up_without_any_extra(installed: Path, tm
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
-def test_a_compiled_wheel_replays_what_pure_python_has_recorded(built: Path, installed: Path, tmp_path: Path) -> None:
+def test_a_compiled_wheel_replays_what_pure_python_has_recorded(built: Path, tmp_path: Path) -> None:
     """Made from the source distribution: by ``make build/compiled/done``, or else here."""
     folder = Path(os.environ.get("COMPILED_WHEEL", tmp_path))
     if folder == tmp_path:
@@ -200,9 +203,9 @@ def test_a_compiled_wheel_replays_what_pure_python_has_recorded(built: Path, ins
     packages = tmp_path / "packages"
     run(sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", packages, compiled, cwd=tmp_path)
     there = {"cwd": tmp_path, "PYTHONPATH": str(packages)}
-    said = run(installed / "python", "-m", "coneskin", "--version", **there)
+    said = run(sys.executable, "-m", "coneskin", "--version", **there)
     assert said == f"coneskin {coneskin.__version__} (compiled)\n"
-    assert "the same, bit by bit" in run(installed / "python", "-m", "coneskin", "replay", COLLISION, **there)
+    assert "the same, bit by bit" in run(sys.executable, "-m", "coneskin", "replay", COLLISION, **there)
 
 
 def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
