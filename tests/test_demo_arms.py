@@ -4,6 +4,7 @@ import contextlib
 import math
 import os
 import random
+import shutil
 import socket
 import subprocess
 import sys
@@ -42,7 +43,9 @@ def site(tmp_path_factory):
     """Folder in which both packages are installed, as pip does it."""
     pytest.importorskip("mujoco")
     folder = tmp_path_factory.mktemp("site")
-    packages = [str(DEMOS / name) for name in ("seven_joints", "xarm")]
+    # pip builds in them, and another process of the tests may do so at the same time
+    copies = tmp_path_factory.mktemp("copies")
+    packages = [shutil.copytree(DEMOS / name, copies / name) for name in ("seven_joints", "xarm")]
     words = ["install", "-q", "--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder)]
     subprocess.run([sys.executable, "-m", "pip", *words, *packages], check=True, timeout=300)
     with pytest.MonkeyPatch.context() as patch:
