@@ -62,6 +62,18 @@ def test_offset_gain_and_shear_are_recovered(sensor: Sensor, count: int) -> None
     assert all(fit.used)
 
 
+def test_a_mark_that_is_read_across_the_seam_is_as_far_off_as_it_looks() -> None:
+    """Three of nine, turned by 12 deg, are read beyond the edge of a full wrap: that is no error of nearly a turn."""
+    sensor = Sensor(Frustum(0.0375, 0.0375, 0.24))
+    turned = PlaceMap(sensor.frustum, (0.0,) * 6, (12.0 / 360.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    marks = [(u, phi) for u in (0.03, 0.12, 0.21) for phi in (0.1, 2.2, 4.3)]
+    touches = [KnownTouch(Place(u, phi), Place(u, (phi - math.radians(12.0)) % math.tau)) for u, phi in marks]
+    assert sum(touch.read.phi > touch.mark.phi for touch in touches) == 3
+    fit = fit_map(sensor, touches, PRECISE)
+    assert fit.place_map.around == pytest.approx(turned.around, abs=2e-5)
+    assert all(fit.used)
+
+
 @pytest.mark.parametrize("sensor", SENSORS)
 @pytest.mark.parametrize("bends", [BENT, COATED])
 @pytest.mark.long

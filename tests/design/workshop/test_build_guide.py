@@ -14,7 +14,7 @@ from coneskin.design.sheets.sheet_design import DesignOptions, JigPlan, SheetDes
 from coneskin.design.sheets.summary import sensor_toml
 from coneskin.design.workshop.build_figures import BuildFigures, bill_of_materials, measure_build
 from coneskin.design.workshop.build_guide import common_lines, sheet_lines
-from coneskin.design.workshop.placement import find_placement, sharpest_bends
+from coneskin.design.workshop.placement import find_datum_faces, find_placement, sharpest_bends
 from coneskin.geometry.developable import Bend, Developable
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.drawing.surface_shape import SheetSide, drawing_point
@@ -24,6 +24,8 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum, double_cone
 from coneskin.geometry.pose import Pose
 from coneskin.skin.sensor import sheet_resistances
+
+from .test_datum_faces import elbow
 
 CONE = Frustum(0.045, 0.060, 0.15)
 SIDES: tuple[SheetSide, ...] = ("end1", "end2", "edge0", "edge1")
@@ -240,6 +242,24 @@ def test_a_sheet_beyond_whose_edge_something_stands_out_is_placed_by_a_straight_
     assert "around end 2, in the direction of the wrap (257.8" not in text
     assert "| +y | 78.5 mm (90.0 deg) |" in text
     assert "| -y |" not in text, "no place of the sheet faces there"
+
+
+def test_distances_from_faces_are_told_of_the_edges_and_ends_that_they_are_of() -> None:
+    mesh = elbow(Pose())
+    place = PlacedFrustum(Frustum(0.03, 0.035, 0.06, 3.5), Pose.from_xyz_rpy((0.01, 0.0, 0.02), (0.5, 0.9, 0.3)))
+    (design,) = design_sheets([place], DesignOptions())
+    faces = {f"from {face.name}": face for face in find_datum_faces(mesh)}
+    text = guide(design, measure_build(design, 0, "elbow", mesh, faces=tuple(faces.values())))
+    (names,) = re.findall(r"^\| place of the sheet \| (.+) \|$", text, re.MULTILINE)
+    slant = design.place.frustum.slant
+    for end, u in ((1, 0.0), (2, slant)):
+        for where, phi in (("edge 0", 0.0), ("the other edge", 3.5)):
+            (told,) = re.findall(rf"^\| end {end}, {where} \| (.+) \|$", text, re.MULTILINE)
+            point = design.place.place(u, phi)[0].reshape(3)
+            for name, said in zip(names.split(" | "), told.split(" | "), strict=True):
+                assert float(said.strip("*").removesuffix(" mm")) == pytest.approx(
+                    1e3 * float(faces[name].height(point)), abs=0.051
+                )
 
 
 def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:

@@ -32,3 +32,10 @@ def test_moves_are_as_fast_as_in_urscript_where_nothing_else_is_said(owner, coun
         assert (told["speed"], told["acceleration"]) == wanted, name
         assert told.get("blend", 0.0) == 0.0
         assert told.get("wait", True) is True
+
+
+@pytest.mark.parametrize(("kind", "target"), [("x", [0.0] * 6), ("j", [0.0] * 7), ("l", [0.0] * 5)])
+def test_a_message_of_another_kind_or_with_another_target_is_no_way_point(kind, target) -> None:
+    assert Waypoint.from_message(["j", True, [1] * 6, 2, 3, 0]) == Waypoint("j", True, (1.0,) * 6, 2.0, 3.0, 0.0)
+    with pytest.raises(ValueError, match="a way point has a kind j, l or p and a target of 6 numbers"):
+        Waypoint.from_message([kind, True, target, 1.0, 1.0, 0.0])
