@@ -262,6 +262,15 @@ def test_distances_from_faces_are_told_of_the_edges_and_ends_that_they_are_of() 
                 )
 
 
+def test_the_play_of_a_collar_is_told_at_its_own_end() -> None:
+    design, figures = built(CONE)
+    text = guide(design, replace(figures, collars=tuple(replace(one, play=0.1) for one in figures.collars)))
+    side = design.place.frustum
+    for end, radius in ((1, side.radius1), (2, side.radius2)):
+        (said,) = re.findall(rf"^\* End {end}: .* be turned by 6 deg \(([\d.]+) mm\) at most", text, re.MULTILINE)
+        assert float(said) == pytest.approx(1e3 * 0.1 * radius, abs=0.051)
+
+
 def test_the_measured_sheets_are_what_the_guide_says_a_perfect_sheet_gives() -> None:
     """A short sheet: what lies beside its active area carries most of the current, and the guide says so."""
     design, figures = built(Frustum(0.054, 0.049, 0.036, math.radians(210)), plan=ElectrodePlan())
