@@ -23,7 +23,7 @@ from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
 from coneskin.skin.virtual.skin import VirtualSkin
 from coneskin.skin.wire import Status, encode
-from tests.skin.bench_top import measured
+from tests.skin.bench_top import measured, unrounded
 from tests.skin.detection.detector_bench import FIRM, SENSOR, DetectorBench, faults_of, play
 
 
@@ -176,6 +176,31 @@ def test_a_frame_from_the_past_neither_begins_nor_ends_a_touch():
     bench.feed(FIRM)
     bench.feed(times=10, **old)
     assert bench.detector.touched
+
+
+def contact_of(level: float) -> LayerContact:
+    """A contact of this level, by bisection of its resistance."""
+    low, high = 1.0, 1e7
+    for _ in range(60):
+        ohms = math.sqrt(low * high)
+        counts = unrounded(SENSOR, [LayerContact(0.2, 1.0, 1.0 / ohms)])
+        above = counts["touch_c"] + counts["touch_d"] > 2.0 * level * counts["touch_supply"]
+        low, high = (ohms, high) if above else (low, ohms)
+    return LayerContact(0.2, 1.0, 1.0 / low)
+
+
+@pytest.mark.promise("P01")
+@pytest.mark.parametrize("early", [False, True])
+def test_a_touch_begins_at_the_threshold_of_the_scene_and_not_beside_it(early: bool) -> None:
+    """The level is the mean of C and D over the supply; 3 % below its threshold of 0.1 nothing begins."""
+    bench, alarms = DetectorBench(), []
+    bench.alarm = (lambda name, level: alarms.append(level)) if early else None
+    bench.feed(times=100)
+    assert bench.feed([contact_of(0.097)], times=200) == []
+    assert alarms == []
+    (began,) = bench.feed([contact_of(0.103)])
+    assert isinstance(began, TouchBegan)
+    assert alarms == ([pytest.approx(0.103, abs=1e-3)] if early else [])
 
 
 def test_hysteresis_between_the_thresholds():
