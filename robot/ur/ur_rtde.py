@@ -172,11 +172,15 @@ class UrArm:
         arm would start by itself. So command 0 is written first: a kick without a program does nothing else.
 
         Raises:
-            RobotRefused: the controller does not start it.
+            RobotRefused: the controller does not start it, or another program runs there and takes its place.
         """
         with _rtde_errors("starting the control program again"):
+            asked = time.monotonic()
             if self.control.isProgramRunning() and self._set_watchdog():
                 return  # the wheel may know of an end a state later: a program that takes a command runs
+            if (waited := time.monotonic() - asked) > _START_TIMEOUT:  # whoever asked has long been told that it failed
+                why = f"another program ran on the controller {self.host} and took no command for {waited:.1f} s"
+                raise RobotRefused(f"{why}: reset again")
             self.mode = Mode.IDLE
             self.control.kickWatchdog()
             time.sleep(_REGISTER_DELAY)

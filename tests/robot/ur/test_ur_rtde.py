@@ -80,6 +80,16 @@ def test_a_program_that_the_wheel_still_takes_to_run_starts_again_where_it_takes
     assert [call[0] for call in a.control.calls] == ["setWatchdog", "kick", "reuploadScript", "setWatchdog"]
 
 
+def test_a_program_of_another_that_ends_long_after_a_reset_starts_none_of_ours(monkeypatch):
+    """The wheel calls any program running, and waits for its answer for as long as that runs."""
+    a, clock = arm(), iter([100.0, 110.0])
+    monkeypatch.setattr(ur_rtde, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    a.control.setWatchdog = lambda frequency: False
+    with pytest.raises(RobotRefused, match=r"another program ran .* no command for 10.0 s: reset again"):
+        a.revive()
+    assert a.control.calls == []
+
+
 def test_what_the_wheel_refuses_is_an_error():
     a = arm(accepts=False)
     with pytest.raises(RobotRefused, match="did not take moveJ: its program is not running"):
