@@ -179,8 +179,9 @@ class UrArm:
             if self.control.isProgramRunning() and self._set_watchdog():
                 return  # the wheel may know of an end a state later: a program that takes a command runs
             if (waited := time.monotonic() - asked) > _START_TIMEOUT:  # whoever asked has long been told that it failed
-                why = f"another program ran on the controller {self.host} and took no command for {waited:.1f} s"
-                raise RobotRefused(f"{why}: reset again")
+                raise RobotRefused(
+                    f"another program ran on {self.host}, and took no command for {waited:.1f} s: reset again"
+                )
             self.mode = Mode.IDLE
             self.control.kickWatchdog()
             time.sleep(_REGISTER_DELAY)

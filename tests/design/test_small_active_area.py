@@ -1,4 +1,4 @@
-"""Sheets of which rims and electrodes leave little: said with numbers, and the advice leaves as much as it says."""
+"""Sheets of which rims and electrodes leave little, and links that sheets cover in part: said as they are built."""
 
 import math
 import re
@@ -8,9 +8,13 @@ from pathlib import Path
 import pytest
 
 from coneskin.cli import main
+from coneskin.design.report import report_text
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.sheets.summary import small_active_area
+from coneskin.design.workshop.build_figures import measure_build
 from coneskin.geometry.drawing.electrode_layout import LEAST_ACTIVE_SHARE, ElectrodePlan, best_layout
+from coneskin.geometry.fit.axis_plan import FittedSheet
+from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
@@ -72,3 +76,15 @@ def test_widths_that_are_chosen_leave_most_active_but_for_the_holes(slant: float
     assert bool(chosen.holes) == (slant == 0.2), "holes cost a tenth of the active area at most"
     given = ElectrodePlan(margin=3e-3, electrode=3e-3, lead=3e-3, hole=0.0)
     assert best_layout(chosen.sheet, given, "end2").plan == replace(given, wires="end2")
+
+
+@pytest.mark.parametrize(
+    ("kept", "words"), [(1.0, "44% of the hull of the link\n"), (0.75, "33% of the hull .*, 11% less")]
+)
+def test_the_report_tells_what_is_covered_as_built(kept: float, words: str) -> None:
+    """A fit of 44 % of a link's hull, of which a sheet may have to leave a quarter to another or to wires."""
+    place = PlacedFrustum(Frustum(0.05, 0.05, 0.2))
+    fitted = FittedSheet(place, 0.0, 0.0, 0.0, 0.0, 1.0, 0.44, 0.0)
+    fit = LinkFit((fitted,), None, 1e-3, 0.2, 0.1, (), "", 1)
+    designs = design_sheets([place.part(0.0, kept * 0.2, 0.0, math.tau)], DesignOptions())
+    assert re.search(words, report_text(designs, [measure_build(designs[0], 0)], "tube", fit=fit))

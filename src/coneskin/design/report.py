@@ -57,7 +57,7 @@ def report_text(
     """
     lines = [f"# Sensor for {link}", ""]
     lines += [f"* {note}" for note in notes]
-    lines += _coverage(fit) if fit else []
+    lines += _coverage(fit, designs) if fit else []
     lines += [f"* **Warning: {small}**" for small in map(small_active_area, designs) if small]
     shown = {
         name: [line for caption, file in pictures if f"/{name}" in file for line in ("", f"![{caption}]({file})")]
@@ -75,15 +75,23 @@ def report_text(
     return "\n".join(lines) + "\n"
 
 
-def _coverage(fit: LinkFit) -> Iterator[str]:
+def built_share(fit: LinkFit, designs: Sequence[SheetDesign]) -> float:
+    """Return the area of the sheets as they are built over that of the fit: room for each other and for wires goes."""
+    built = sum(design.place.frustum.area for design in designs if not design.above)
+    return built / sum(sheet.frustum.area for sheet in fit.sheets)
+
+
+def _coverage(fit: LinkFit, designs: Sequence[SheetDesign]) -> Iterator[str]:
     axes = len({sheet.axis for sheet in fit.sheets})
     count = "1 sheet covers" if len(fit.sheets) == 1 else f"{len(fit.sheets)} sheets cover"
+    built, share = built_share(fit, designs), sum(sheet.area_share for sheet in fit.sheets)
+    lost = f", {(1.0 - built) * share:.0%} less than they could: they leave room for each other and for wires"
     yield (
         f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
-        f"{sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull of the link"
+        f"{built * share:.0%} of the hull of the link{lost if (1.0 - built) * share >= 0.005 else ''}"
     )
     if fit.touch_weights:
-        share = sum(sheet.touch_share for sheet in fit.sheets)
+        share = built * sum(sheet.touch_share for sheet in fit.sheets)
         most = "the sheets are those that cover most of what counts"
         yield f"* Weighed by {fit.touch_weights.name}, that is {share:.0%} of it: {most}"
     for area in fit.bare_areas:

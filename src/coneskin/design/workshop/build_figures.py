@@ -405,7 +405,7 @@ def bill_of_materials(
             ("PLA or PETG, for a 3D printer", f"{1e6 * plastic:.0f} cm3, and its support", "jig"),
             (
                 "hook-and-loop tape 15 to 20 mm wide",
-                f"{len(collars)} pieces of {10.0 * math.ceil(1e2 * around):.0f} mm",
+                f"{len(collars)} piece{'s' * (len(collars) > 1)} of {10.0 * math.ceil(1e2 * around):.0f} mm",
                 "around the collars",
             ),
         ]
