@@ -64,7 +64,7 @@ def test_virtual_skin() -> None:
     assert "stream ended: SkinConnectionError" in out
     frames, missing = map(int, re.findall(r"(\d+) (?:frames|missing)", out))
     assert frames + missing <= 600  # 0.6 s at 1000 Hz
-    assert missing >= 600 // 97
+    assert missing >= (frames + missing) // 97  # each 97th; a held-up skin sends fewer than 600
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on Windows")
