@@ -2,6 +2,7 @@
 
 import math
 import random
+from collections.abc import Callable
 
 import pytest
 
@@ -23,6 +24,17 @@ SHAPES = {
 OHMS, NOISE = 1000.0, 0.7
 
 
+def frame_of(sensor: Sensor, y: list[list[float]], noise: Callable[[], float] = lambda: 0.0) -> Frame:
+    """What the converter counts of an admittance, each count with a noise of its own."""
+    parts = sensor.electronics
+    volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
+    counts = {
+        name: round(value * (ampere if name.endswith("current") else volt) + noise())
+        for name, value in measure(sensor, (y, y, y))._asdict().items()
+    }
+    return Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
+
+
 def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: int) -> list[tuple[float, ...]]:
     """Square of the error [m^2], in deviations, as the covariance says, and uncorrected; place by place."""
     cone, rng = SHAPES[shape], random.Random(f"{shape} {bits} {radius} {ka}")
@@ -36,15 +48,9 @@ def errors(shape: str, bits: int, radius: float, ka: float, off: float, places: 
     edges = [1.2 * radius / cone.radius_at(u) for u in us]
     phis = [rng.uniform(edge, cone.wrap - edge) for edge in edges]
     matrices = model.admittance(model.contacts(us, phis, radius, (ka / radius) ** 2 / (2.0 * OHMS))).tolist()
-    volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
     found = []
     for u, phi, y in zip(us, phis, matrices, strict=True):
-        inputs = measure(sensor, (y, y, y))._asdict()
-        counts = {
-            name: round(v * (ampere if name.endswith("current") else volt) + rng.gauss(0.0, NOISE))
-            for name, v in inputs.items()
-        }
-        frame = Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
+        frame = frame_of(sensor, y, lambda: rng.gauss(0.0, NOISE))
         matrix = inversion.invert(frame[6:18])
         assert matrix is not None
         one = noise.of(matrix, frame, NOISE**2 + 1.0 / 12.0)
@@ -103,16 +109,10 @@ def test_a_long_contact_at_an_edge_is_found_at_its_middle(along, around):
     sensor = Sensor(cone, upper_sheet_ohms=OHMS, lower_sheet_ohms=OHMS, electronics=parts, tolerance=IDEAL_SHEETS)
     model, inversion = FieldModel(SectorSheet.of_frustum(cone), OHMS, OHMS, 1e-7), FrameInversion(sensor)
     estimator = PlaceEstimator(sensor)
-    volt, ampere = parts.full_count / parts.adc_volts, parts.full_count / parts.current_full_scale
     for u, phi in ((0.02, 0.5), (0.02, 3.0), (0.22, 5.6)):
         turn = around / cone.radius_at(u)
         scene = model.contacts([[u - along, u + along]], [[phi - turn, phi + turn]], 0.004)
-        y = model.admittance(scene)[0].tolist()
-        counts = {
-            name: round(value * (ampere if name.endswith("current") else volt))
-            for name, value in measure(sensor, (y, y, y))._asdict().items()
-        }
-        frame = Frame(40, 0, 0, 0, 0, 0, *[counts[name] for name in Frame._fields[6:-1]])
+        frame = frame_of(sensor, model.admittance(scene)[0].tolist())
         matrix = inversion.invert(frame[6:18])
         assert matrix is not None
         one = FrameNoise(sensor).of(matrix, frame, NOISE**2 + 1.0 / 12.0)
