@@ -22,6 +22,7 @@ from coneskin.commands import design as command
 from coneskin.design import folder as design_folder
 from coneskin.design import link_design
 from coneskin.design.link_design import LinkMesh
+from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.frustum import Frustum
 
@@ -190,10 +191,8 @@ def test_a_deviation_is_said_with_what_is_no_mistake_of_the_fit(
     facets: float, bridged: float, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = link_design.design_link(Frustum(0.05, 0.05, 0.1, 2.0))
-    fit = SimpleNamespace(
-        max_deviation=1e-4, rms_deviation=5e-5, facet_height=facets, bridged_share=bridged, bridged_depth=1.5e-3
-    )
-    command._print(replace(found, sheets=(replace(found.sheets[0], fit=fit),)))  # type: ignore[arg-type]
+    fitted = FittedSheet(found.sheets[0].place, 1e-4, 5e-5, bridged, 1.5e-3, 1.0, 1.0, facets / 1.5)
+    command._print(replace(found, sheets=(replace(found.sheets[0], found=fitted),)))
     line = capsys.readouterr().out.splitlines()[0]
     assert line.partition(", deviation ")[2] == f"0.100 mm at most, 0.050 mm rms{said}"
 

@@ -5,9 +5,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
 
 from coneskin.cli import main
+from coneskin.design.link_design import design_link
 from coneskin.design.report import report_text
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.sheets.summary import small_active_area
@@ -17,6 +20,7 @@ from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
+from tests.geometry.synthetic import placed, revolve
 
 _NUMBER = r"([\d.]+)"
 _SENTENCE = (
@@ -86,5 +90,28 @@ def test_the_report_tells_what_is_covered_as_built(kept: float, words: str) -> N
     place = PlacedFrustum(Frustum(0.05, 0.05, 0.2))
     fitted = FittedSheet(place, 0.0, 0.0, 0.0, 0.0, 1.0, 0.44, 0.0)
     fit = LinkFit((fitted,), None, 1e-3, 0.2, 0.1, (), "", 1)
-    designs = design_sheets([place.part(0.0, kept * 0.2, 0.0, math.tau)], DesignOptions())
-    assert re.search(words, report_text(designs, [measure_build(designs[0], 0)], "tube", fit=fit))
+    (built,) = design_sheets([place.part(0.0, kept * 0.2, 0.0, math.tau)], DesignOptions())
+    design = replace(built, found=fitted)
+    assert re.search(words, report_text((design,), [measure_build(design, 0)], "tube", fit=fit))
+
+
+@pytest.mark.long
+def test_each_sheet_and_all_together_tell_the_share_of_the_link_as_built(tmp_path: Path) -> None:
+    """Against points of the mesh under the sheets: open seams and wires at end 2 take of each as much as they do."""
+    mesh = placed(revolve([(0.0, 0.03), (0.1, 0.06), (0.2, 0.06)]))
+    options = DesignOptions(seam_gap=0.03, wires="end2")
+    design = design_link(mesh, tmp_path / "out", options=options, pictures=False)
+    points, _ = trimesh.sample.sample_surface(trimesh.Trimesh(mesh.vertices, mesh.faces), 100_000, seed=1)
+    report, told = (tmp_path / "out" / "report.md").read_text(), []
+    for sheet, data in zip(design.sheets, design.data["sheets"], strict=True):
+        u, phi, off = sheet.place.locate_all(points)
+        side = sheet.place.frustum
+        under = (np.abs(off) <= 1.5e-3) & (u >= 0.0) & (u <= side.slant) & (phi >= 0.0) & (phi <= side.wrap)
+        told.append(data["fit"]["area_share"])
+        assert told[-1] == pytest.approx(float(under.mean()), abs=0.01)
+        assert told[-1] == data["fit"]["touch_share"]
+        assert f" of its length, {told[-1]:.0%} of its hull |" in report
+    assert len(told) == 2
+    assert design.fit is not None
+    assert sum(sheet.area_share for sheet in design.fit.sheets) == pytest.approx(sum(told), abs=1e-4)
+    assert f" {sum(told):.0%} of the hull of the link, " in report

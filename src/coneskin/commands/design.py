@@ -33,7 +33,6 @@ from coneskin.core.errors import GeometryError
 from coneskin.design.design_toml import DESIGN_TABLES, read_settings, settings_text
 from coneskin.design.first_scene import arm_link
 from coneskin.design.link_design import LinkDesign, NothingFits, design_link
-from coneskin.design.report import built_share
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.sheets.summary import small_active_area
 from coneskin.geometry.frustum import Frustum
@@ -267,7 +266,7 @@ def _print(found: LinkDesign) -> None:
             print(f"  warning: {small}")
     fit = found.fit
     if fit is not None and fit.touch_weights:
-        share = built_share(fit, found.sheets) * sum(sheet.touch_share for sheet in fit.sheets)
+        share = sum(sheet.touch_share for sheet in fit.sheets)
         print(f"weighed by {fit.touch_weights.name}, the sheets cover {share:.0%} of the hull")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")

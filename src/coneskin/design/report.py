@@ -75,23 +75,19 @@ def report_text(
     return "\n".join(lines) + "\n"
 
 
-def built_share(fit: LinkFit, designs: Sequence[SheetDesign]) -> float:
-    """Return the area of the sheets as they are built over that of the fit: room for each other and for wires goes."""
-    built = sum(design.place.frustum.area for design in designs if not design.above)
-    return built / sum(sheet.frustum.area for sheet in fit.sheets)
-
-
 def _coverage(fit: LinkFit, designs: Sequence[SheetDesign]) -> Iterator[str]:
-    axes = len({sheet.axis for sheet in fit.sheets})
-    count = "1 sheet covers" if len(fit.sheets) == 1 else f"{len(fit.sheets)} sheets cover"
-    built, share = built_share(fit, designs), sum(sheet.area_share for sheet in fit.sheets)
-    lost = f", {(1.0 - built) * share:.0%} less than they could: they leave room for each other and for wires"
+    built = [design.fit for design in designs if design.fit is not None]
+    axes = len({sheet.axis for sheet in built})
+    count = "1 sheet covers" if len(built) == 1 else f"{len(built)} sheets cover"
+    share = sum(sheet.area_share for sheet in built)
+    lost = sum(design.found.area_share for design in designs if design.found is not None) - share
+    less = f", {lost:.0%} less than they could: they leave room for each other, seams and wires"
     yield (
         f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
-        f"{built * share:.0%} of the hull of the link{lost if (1.0 - built) * share >= 0.005 else ''}"
+        f"{share:.0%} of the hull of the link{less if lost >= 0.005 else ''}"
     )
     if fit.touch_weights:
-        share = built * sum(sheet.touch_share for sheet in fit.sheets)
+        share = sum(sheet.touch_share for sheet in built)
         most = "the sheets are those that cover most of what counts"
         yield f"* Weighed by {fit.touch_weights.name}, that is {share:.0%} of it: {most}"
     for area in fit.bare_areas:

@@ -161,7 +161,7 @@ def _assembled(
     fit = dataclasses.replace(design.fit, sheets=tuple(fits.values()), bare_areas=())
     named = dataclasses.replace(options, link=design.name)
     sheets, left_out = design_assembly(fit, named, design.mesh, beside=beside)
-    numbers = [number for sheet in sheets for number, one in fits.items() if one is sheet.fit]
+    numbers = [number for sheet in sheets for number, one in fits.items() if one is sheet.found]
     notes = (*_renumbered(design.notes, numbers), *left_out)
     fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
     return dataclasses.replace(design, sheets=sheets, fit=fit, notes=notes)
@@ -258,7 +258,7 @@ def design_robot(
             if not wanted:
                 continue
             if len(wanted) < len(design.sheets):
-                places = {k: one.fit for k, one in enumerate(design.sheets, 1) if k in wanted and one.fit is not None}
+                places = {k: kept for k, one in enumerate(design.sheets, 1) if k in wanted and (kept := one.found)}
                 design = _assembled(design, places, options, beside[name])
             figures = _measured(design.sheets, design.mesh, design.frame, len(built))
             design.written(

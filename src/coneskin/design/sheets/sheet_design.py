@@ -154,7 +154,7 @@ class SheetDesign:
         way: of its cable on the link.
         gaps: least distance to each other sheet nearer than 20 mm, by its name [m].
         joints: what meets its "end 1" and its "end 2", by the number of the joint, such as {1: "end 1 of sheet 2"}.
-        fit: fit of the place to the mesh; None for a link given by its dimensions.
+        found: sheet on the mesh that the place is made from; None for a link given by its dimensions.
         above: name of the sheet on which it lies, where it is a strip over the seam of that.
         seam_offset: angle from edge 0 of such a strip to the middle of the seam below it [rad].
     """
@@ -171,12 +171,17 @@ class SheetDesign:
     way: CableWay
     gaps: Mapping[str, float] = field(default_factory=dict)
     joints: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
-    fit: FittedSheet | None = None
+    found: FittedSheet | None = None
     above: str = ""
     seam_offset: float = 0.0
 
     def __repr__(self) -> str:
         return f"<SheetDesign {self.name!r}: {self.dimensions}>"
+
+    @property
+    def fit(self) -> FittedSheet | None:
+        """Fit of the place to the mesh: what was found there, as it is built; None where nothing was."""
+        return self.found and self.found.covering(self.place)
 
     @property
     def dimensions(self) -> str:
@@ -299,8 +304,8 @@ def design_assembly(
     for number, one in enumerate(placed, first):
         apart = {f"sheet {k}": sheet_gap(one.sheet, two.sheet)[0] for k, two in enumerate(placed, first) if k != number}
         try:
-            fit = fits[one.index] if fits else None
-            designs.append(_sheet_design(f"sheet {number}", one, options, apart, joints[number], fit))
+            found = fits[one.index] if fits else None
+            designs.append(_sheet_design(f"sheet {number}", one, options, apart, joints[number], found))
         except GeometryError as exc:
             raise GeometryError(f"sheet {number}: {exc}") from exc
         except SensorError as exc:
@@ -331,7 +336,7 @@ def _sheet_design(
     options: DesignOptions,
     apart: Mapping[str, float],
     joints: Mapping[str, Mapping[int, str]],
-    fit: FittedSheet | None,
+    found: FittedSheet | None,
 ) -> SheetDesign:
     """Return a sheet with its drawings and its electronics."""
     active = _active(placed.place, placed.layout, options.stack)
@@ -362,7 +367,7 @@ def _sheet_design(
         way=placed.way,
         gaps={other: gap for other, gap in apart.items() if gap < _NEAR_SHEET},
         joints=joints,
-        fit=fit,
+        found=found,
     )
 
 

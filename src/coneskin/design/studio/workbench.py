@@ -216,7 +216,7 @@ class Workbench:
                 refused += left_out
             except GeometryError as exc:
                 refused.append(str(exc))
-        self.places = tuple(next(n for n, fit in fits.items() if fit is design.fit) for design in self.designs)
+        self.places = tuple(next(n for n, fit in fits.items() if fit is design.found) for design in self.designs)
         self.left_out = tuple(refused)
 
     def seam_notes(self) -> tuple[str, ...]:
@@ -275,7 +275,7 @@ class Workbench:
         data = write_design(
             folder,
             self.designs,
-            fit=replace(self._fit, sheets=tuple(design.fit for design in self.designs if design.fit is not None)),
+            fit=self._fit,
             mesh=self.link.mesh,
             title=self.link.name,
             source=self.link.mesh.source,
