@@ -6,7 +6,8 @@ touches known places and takes most of it off. What is not calibrated is a floor
 
 With x and y parts of the sides, R the sheet's resistance from electrode to electrode, and for the other sheet likewise:
 
-    leads and the electrodes' own lines    ((1 - x)^2 + x^2) ohm^2/R^2
+    leads                                  ((1 - x)^2 + x^2) lead^2/R^2
+    the electrodes' own lines              (d(x)^2 + d(1 - x)^2 - 4/pi d(x) d(1 - x)) line^2/R^2
     resistance that grows along the sheet  (x (1 - x)/2)^2 slope^2
     patches                                x (1 - x) patches^2 c
     current that runs aslant               h(x, y)^2 skew^2
@@ -14,7 +15,11 @@ With x and y parts of the sides, R the sheet's resistance from electrode to elec
 
 are variances of x. f = ln sec(pi peel/2)/pi is what the gap throttles; the rest of a peel is fitted to finite elements.
 h is the potential of the current that the two insulated edges turn back, a series of odd n:
-h = sum 4/(n pi)^2 sin(n pi x) sinh(n pi b (y - 1/2))/cosh(n pi b/2), b the breadth over the length.
+h = sum 4/(n pi)^2 sin(n pi x) sinh(n pi b (y - 1/2))/cosh(n pi b/2), b the breadth over the length. It is zero on the
+middle line, so it is taken further out, by 1.5 deviations of y. The drop of a line that is fed at one end grows from 0
+to 1/2: d = (1 - x)/3 + 2/pi^2 |cos(pi y)| exp(-pi x/b)/sqrt 2 has its mean and the first term of a series. Which end is
+fed is not told: the term counts as if it were the other, less what that is too much in the mean. The drops of two
+electrodes have one sign, and oppose each other.
 """
 
 from __future__ import annotations
@@ -25,8 +30,11 @@ from typing import Final
 
 from coneskin.core.errors import SensorError
 
-LINE_SHARE: Final = 0.23  #: of an electrode's own resistance: its mean drop is 1/3, and both electrodes' oppose
+LINE_SHARE: Final = 0.23  #: of a line's ohms: what a lead does like the mean drops of two, which oppose each other
 PATCH_SHARE: Final = 0.11  #: of the variance of patches a third of a side wide: what a line through them sees
+_OPPOSED: Final = 4.0 / math.pi  # of the product of two drops, each the size of a Gaussian number
+_LINE_BEND: Final = math.sqrt(2.0) / math.pi**2  # of a line's ohms: how its drop differs from the mean one
+_SKEW_REACH: Final = 1.5  # deviations of a place; what grows with two errors at once has longer tails than one
 _PEEL_SHARE: Final = 0.092  # of the cube of a peel; variance at its electrode, over the breadth's square
 _PEEL_DECAY: Final = 13.4  # of that variance, over the distance in breadths
 _CONTACT_SHARE: Final = 0.25  # of the correction for a contact's size; none is a uniform disc
@@ -91,8 +99,8 @@ class PlaceFloor:
 
     def __init__(self, tolerance: SheetTolerance, size: tuple[float, float], ohms: tuple[float, float]) -> None:
         self._length, self._breadth = size
-        leads = math.sqrt(tolerance.lead**2 + (LINE_SHARE * tolerance.line) ** 2)
-        self._leads = (leads / ohms[0]) ** 2, (leads / ohms[1]) ** 2
+        self._leads = (tolerance.lead / ohms[0]) ** 2, (tolerance.lead / ohms[1]) ** 2
+        self._lines = (tolerance.line / ohms[0]) ** 2, (tolerance.line / ohms[1]) ** 2
         self._slope, self._patches = 0.25 * tolerance.slope**2, PATCH_SHARE * tolerance.patches**2
         self._skew = tolerance.skew
         self._throttled = (math.log(1.0 / math.cos(0.5 * math.pi * tolerance.peel)) / math.pi) ** 2
@@ -116,28 +124,35 @@ class PlaceFloor:
         if self._mapped is not None:
             known = self._mapped * self._mapped
             return xx + known, xy, yy + known
-        skew = self._skew
-        turned_x = skew * _turned_back(x, y, breadth / length) if skew else 0.0
-        turned_y = skew * _turned_back(y, x, length / breadth) if skew else 0.0
-        return (
-            xx
-            + length * length * (self._along(x, self._leads[0]) + turned_x * turned_x)
-            + breadth * breadth * self._peeled(x, length / breadth),
-            xy,
-            yy
-            + breadth * breadth * (self._along(y, self._leads[1]) + turned_y * turned_y)
-            + length * length * self._peeled(y, breadth / length),
-        )
+        wide, long = breadth / length, length / breadth
+        xx += length * length * self._along(x, y, 0, long) + breadth * breadth * self._peeled(x, long)
+        yy += breadth * breadth * self._along(y, x, 1, wide) + length * length * self._peeled(y, wide)
+        if self._skew:
+            off = _SKEW_REACH * (math.sqrt(yy) / breadth + self._skew * abs(_turned_back(y, x, long)))
+            turned_x = self._skew * length * _turned_back(x, y + math.copysign(off, y - 0.5), wide)
+            off = _SKEW_REACH * (math.sqrt(xx) + abs(turned_x)) / length
+            turned_y = self._skew * breadth * _turned_back(y, x + math.copysign(off, x - 0.5), long)
+            xx, yy = xx + turned_x * turned_x, yy + turned_y * turned_y
+        return xx, xy, yy
 
     def _peeled(self, x: float, ratio: float) -> float:
         """Return the variance by what peels off either electrode, in squares of the breadth."""
         rest, decay = 1.0 - x, -_PEEL_DECAY * ratio
         return self._throttled * (x * x + rest * rest) + self._bent * (math.exp(decay * x) + math.exp(decay * rest))
 
-    def _along(self, x: float, leads: float) -> float:
+    def _along(self, x: float, y: float, sheet: int, ratio: float) -> float:
+        """Return the variance by leads, lines, slope and patches, in squares of the side along x."""
         rest = 1.0 - x
         both = x * rest
-        return leads * (1.0 - 2.0 * both) + both * (self._slope * both + self._patches)
+        bend = _LINE_BEND * abs(math.cos(math.pi * y))
+        near = rest / 3.0 + bend * math.exp(-math.pi * x * ratio)
+        far = x / 3.0 + bend * math.exp(-math.pi * rest * ratio)
+        lines = near * near + far * far - _OPPOSED * near * far
+        return (
+            self._leads[sheet] * (1.0 - 2.0 * both)
+            + self._lines[sheet] * lines
+            + both * (self._slope * both + self._patches)
+        )
 
 
 def _turned_back(x: float, y: float, ratio: float) -> float:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
@@ -68,6 +69,35 @@ def test_the_floor_holds_a_fifth_of_an_electrode_that_no_reading_shows_to_have_p
         floor = PlaceFloor(tolerance, size, (1048.0, 954.0))
         variances = np.array([[floor.at(a, b, 0.0, 0.0)[0] for b in x] for a in x])
         assert bool(np.mean(off**2 < 3.84 * variances) > 0.93) is held
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("flaw", ["line", "skew"])
+def test_the_ellipse_of_the_floor_holds_19_of_20_places_of_sheets_drawn_from_their_class(flaw: str) -> None:
+    """By the potentials of both sheets alone; the floor is asked where a touch seems to be. Either end is fed."""
+    size, rng, held = (0.24, 0.229), np.random.default_rng(5), []
+    floor = PlaceFloor(
+        SheetTolerance(**{flaw: 20.0 if flaw == "line" else 0.05, "reading": 1e-6}), size, (1048.0, 954.0)
+    )
+    part = np.linspace(0.1, 0.9, 17)
+    x, y = (part * side for side in size)
+
+    def seen(along: tuple[float, float]) -> np.ndarray:
+        """Where a sheet puts what lies on a grid, along its own side [m]."""
+        flaws = SheetFlaws(lines=tuple(abs(rng.normal(0.0, 20.0, 2))))
+        flaws = flaws if flaw == "line" else SheetFlaws(skew=rng.normal(0.0, 0.05))
+        field = BuiltSheet(flaws, along, 1000.0).answer[:2401, 1].reshape(49, 49)
+        field = field[:, ::-1] if rng.random() < 0.5 and flaw == "line" else field
+        return along[0] * RegularGridInterpolator((np.linspace(0.0, 1.0, 49),) * 2, field)(grid)
+
+    grid = np.stack(np.meshgrid(part, part, indexing="ij"), axis=-1)
+    for _ in range(60):
+        at_x, at_y = seen(size), seen(size[::-1]).T
+        for i, j in np.ndindex(at_x.shape):
+            xx, xy, yy = floor.at(at_x[i, j] / size[0], at_y[i, j] / size[1], 0.0, 0.0)
+            dx, dy = at_x[i, j] - x[i], at_y[i, j] - y[j]
+            held.append((yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy) < 5.991)
+    assert 0.93 < np.mean(held) < 0.98
 
 
 @pytest.mark.parametrize(("size", "at", "number"), [((0.1, 1.0), (0.5, 1.0), 0), ((1.0, 0.1), (1.0, 0.5), 2)])
