@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, UNGUARDED_TIME
 from coneskin.robot.stop.limits import MonitoringLimits
@@ -22,6 +24,7 @@ _STOP_TICKS = 1  # in which an arm that was told to has stopped
 _LONGEST = 30  # ticks; longer than every limit
 
 
+@cache
 def _ticks(seconds: float) -> int:
     return _LONGEST if seconds == math.inf else math.ceil(seconds / _TICK - 1e-9)
 
@@ -74,8 +77,7 @@ PROCESS_INVARIANTS = {
 _ALIVE, _FROZEN, _DEAD, _HELD_UP = "alive", "frozen", "dead", "held up"
 
 
-@dataclass(frozen=True)
-class _State:
+class _State(NamedTuple):  # a tuple, since it is compared and hashed a million times
     """All of it. Ages are in ticks since the last beat was heard; what is not listened to has the age 0."""
 
     program: str = _ALIVE
@@ -162,19 +164,19 @@ class ProcessWorld:
         before, broken = self.state, list[str]()
         match action.split():
             case ["freeze", name]:
-                self.state = replace(before, **{name: _FROZEN}, wrong_for=0)
+                self.state = before._replace(**{name: _FROZEN}, wrong_for=0)
             case ["hold", name]:
-                self.state = replace(before, **{name: _HELD_UP}, wrong_for=0)
+                self.state = before._replace(**{name: _HELD_UP}, wrong_for=0)
             case ["kill", name]:
-                self.state = replace(before, **{name: _DEAD}, wrong_for=0)
+                self.state = before._replace(**{name: _DEAD}, wrong_for=0)
             case ["thaw", name]:
-                self.state = replace(before, **{name: _ALIVE}, wrong_for=0)
+                self.state = before._replace(**{name: _ALIVE}, wrong_for=0)
             case ["restart"]:  # the program ends, its processes with it, and a new one begins with a guard that waits
                 self.state = _State(moves=False, latched=True, cut=before.cut, touched=before.touched)
             case ["cut", *_] | ["mend", *_]:
-                self.state = replace(before, cut=not before.cut, wrong_for=0)
+                self.state = before._replace(cut=not before.cut, wrong_for=0)
             case ["touch"] | ["free"]:
-                self.state = replace(before, touched=action == "touch")
+                self.state = before._replace(touched=action == "touch")
             case ["reset"]:
                 self._reset()
             case ["tick"] | ["lose", *_]:
@@ -188,7 +190,7 @@ class ProcessWorld:
         fine = state.program_age <= _ticks(parts.program_silence) and state.helper_age <= _ticks(parts.process_silence)
         lives = state.program == state.guard == state.helper == state.second == _ALIVE
         if lives and fine and heard and not state.touched:
-            self.state = replace(state, latched=False, moves=True, wrong_for=0, kick_age=0)  # its program starts again
+            self.state = state._replace(latched=False, moves=True, wrong_for=0, kick_age=0)  # its program starts again
 
     def _tick(self, lost: bool) -> list[str]:
         """Let a tick pass: beats, what each notices, and what comes of it."""
@@ -236,8 +238,7 @@ class ProcessWorld:
         # internal: a driver process that is gone can start nothing, but what runs goes on until the watchdog ends it
         wrong = self._wrong() > 0
         wrong_for = min(_LONGEST, state.wrong_for + 1) if wrong and moves else 0
-        self.state = replace(
-            state,
+        self.state = state._replace(
             **age,  # type: ignore[arg-type]
             moves=moves,
             latched=state.latched or latch or (state.moves and not moves),
