@@ -138,26 +138,13 @@ def test_a_barrel_keeps_its_axis_and_its_tolerance() -> None:
 
 
 @pytest.mark.long
-def test_more_sheets_cover_more_of_a_curved_body() -> None:
-    heights = np.linspace(0, 0.3, 31).tolist()
-    body = placed(revolve([(z, 0.04 + 0.03 * math.sqrt(1.0 - ((z - 0.15) / 0.17) ** 2)) for z in heights], segments=64))
-    covers = []
-    for most in (1, 2, 3):
-        fit = cones(body, max_sheets=most)
-        assert len(fit.sheets) == most
-        assert all(sheet.max_deviation <= 0.001 + 1e-9 for sheet in fit.sheets)
-        covers.append(sum(sheet.length_share for sheet in fit.sheets))
-    assert covers[0] + 0.1 < covers[1] < covers[2]
-
-
-@pytest.mark.long
 def test_a_tube_needs_one_sheet_however_many_are_allowed() -> None:
     assert len(cones(placed(frustum(0.05, 0.05, 0.2)), max_sheets=6).sheets) == 1
 
 
 @pytest.mark.long
 def test_bolt_holes_are_bridged_and_said() -> None:
-    (sheet,) = find_cones(placed(holed())).sheets
+    (sheet,) = cones(placed(holed())).sheets
     assert sheet.frustum.radius1 == pytest.approx(0.05, abs=2e-6)
     assert 0.0005 < sheet.bridged_share < 0.005  # six holes of 6 mm on a tube of 300 mm
     assert sheet.bridged_depth == pytest.approx(0.006, abs=1e-4)
@@ -217,7 +204,7 @@ def box(width: float, depth: float, height: float) -> tuple[Floats, Indices]:
 
 @pytest.mark.long
 def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
-    fit = find_cones(placed(box(0.1, 0.12, 0.3)))
+    fit = cones(placed(box(0.1, 0.12, 0.3)))
     assert fit.sheets == ()
     assert "100 % of the surface lies on the convex hull" in fit.reason
     assert "allow_hull (--set search.allow_hull=true) if this is the visual mesh" in fit.reason
@@ -234,7 +221,7 @@ def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
     hull = ConvexHull(np.concatenate(rings))
     body = make_mesh(hull.points, hull.simplices)
     assert cones(body).sheets == ()
-    sheets = find_cones(body, allow_hull=True).sheets
+    sheets = cones(body, allow_hull=True).sheets
     # as far as the tolerance lets a sheet go over the flats, for a larger one
     assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=1e-3)
 
@@ -243,12 +230,12 @@ def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
 def test_a_link_shorter_than_a_sheet_is_told_so() -> None:
     fit = find_cones(placed(frustum(0.005, 0.005, 0.018)))
     assert fit.reason == "the link is 18.0 mm long, but a sheet needs at least 25 mm"
-    assert len(find_cones(placed(frustum(0.005, 0.005, 0.018)), min_length=0.01).sheets) == 1
+    assert len(cones(placed(frustum(0.005, 0.005, 0.018)), min_length=0.01).sheets) == 1
 
 
 @pytest.mark.long
 def test_a_narrow_wrap_asked_for_on_a_convex_body_is_given() -> None:
-    (sheet,) = find_cones(placed(frustum(0.05, 0.05, 0.3)), wrap=1.0, max_wires=4).sheets
+    (sheet,) = cones(placed(frustum(0.05, 0.05, 0.3)), wrap=1.0, max_wires=4).sheets
     assert sheet.frustum.wrap == pytest.approx(1.0, abs=0.05)
     assert sheet.frustum.height > 0.29
 
@@ -265,7 +252,7 @@ def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
 
 @pytest.mark.long
 def test_the_slow_rays_give_the_same_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
-    body = placed(frustum(0.05, 0.04, 0.3, segments=32))
+    body = placed(frustum(0.05, 0.04, 0.3, segments=32, rings=1))
     fast = find_cones(body)
     monkeypatch.setitem(body.__dict__, "embree_intersector", None)
     slow = find_cones(body)
@@ -366,7 +353,7 @@ def test_wires_are_four_for_each_sheet() -> None:
 @pytest.mark.long
 def test_a_shallow_dent_counts_as_a_deviation_and_a_deep_one_as_a_hole() -> None:
     """A dent less deep than the tolerance is no hole: the sheet stands off from it, and says by how much."""
-    (shallow,) = find_cones(placed(holed(depth=8e-4)), max_sheets=1).sheets
+    (shallow,) = cones(placed(holed(depth=8e-4)), max_sheets=1).sheets
     assert shallow.bridged_share == 0.0
     assert shallow.max_deviation == pytest.approx(8e-4, abs=5e-5)
 
@@ -396,7 +383,7 @@ def test_rules_out_of_range(rule: dict[str, float], words: str) -> None:
 
 @pytest.mark.long
 def test_ur10_upper_arm() -> None:
-    fit = find_cones(link("ur/ur10/collision/upperarm.stl"))
+    fit = cones(link("ur/ur10/collision/upperarm.stl"))
     sheet = fit.sheets[0]
     assert 0.5 * (sheet.frustum.radius1 + sheet.frustum.radius2) == pytest.approx(0.054, abs=3e-6)
     assert math.degrees(math.acos(min(1.0, axis_of(sheet)[2]))) < 0.05
@@ -418,7 +405,7 @@ def test_ur10_upper_arm() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "radius", "length"), [("upperarm", 42.65, 234.0), ("forearm", 37.5, 259.0)])
 def test_ur5e_links_from_exploded_collada(name: str, radius: float, length: float) -> None:
-    fit = find_cones(link(f"ur/ur5e/visual/{name}.dae"), max_sheets=1)
+    fit = cones(link(f"ur/ur5e/visual/{name}.dae"), max_sheets=1)
     sheet = fit.sheets[0]
     assert 0.5e3 * (sheet.frustum.radius1 + sheet.frustum.radius2) == pytest.approx(radius, abs=0.2)
     assert 1e3 * sheet.frustum.height >= length
@@ -432,7 +419,7 @@ def test_ur5e_links_from_exploded_collada(name: str, radius: float, length: floa
 
 @pytest.mark.long
 def test_hull_like_forearm_is_refused_with_the_reason() -> None:
-    fit: LinkFit = find_cones(link("ur/ur5e/collision/forearm.stl"))
+    fit: LinkFit = cones(link("ur/ur5e/collision/forearm.stl"))
     assert fit.sheets == ()
     assert "convex hull" in fit.reason
     assert "visual mesh" in fit.reason
@@ -442,7 +429,7 @@ def test_hull_like_forearm_is_refused_with_the_reason() -> None:
 
 @pytest.mark.long
 def test_uf850_link4_is_a_true_cone() -> None:
-    sheet = find_cones(link("xarm/uf850_link4.stl"), max_sheets=1).sheets[0]
+    sheet = cones(link("xarm/uf850_link4.stl"), max_sheets=1).sheets[0]
     assert abs(math.degrees(sheet.frustum.half_angle)) == pytest.approx(0.65, abs=0.06)
     radii = sorted((1e3 * sheet.frustum.radius1, 1e3 * sheet.frustum.radius2))
     assert radii == pytest.approx([43.9, 45.0], abs=0.15)

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from coneskin.geometry.fit.cones import LEAST_GAIN
+from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.developable import packing
-from coneskin.geometry.fit.developable.packing import find_sheets
+from coneskin.geometry.fit.developable.packing import find_sheets, with_developables
 from coneskin.geometry.fit.developable.side_fit import fit_developable
-from coneskin.geometry.mesh import make_mesh
+from coneskin.geometry.fit.fit_options import FitOptions
+from coneskin.geometry.mesh import Mesh, make_mesh
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, Section, ellipse_section, rounded_box_section, stadium_section
+
+from ..shared_fits import sampled
 
 POSE = Pose.from_xyz_rpy((0.1, 0.2, -0.1), (0.5, -0.3, 0.8))
 TUBES = {
@@ -24,6 +27,13 @@ TUBES = {
     "oblique cone": RuledTube(ellipse_section(0.06, 0.045), 0.2, (0.05, 0.0, 0.8), POSE),
     "tapered box": RuledTube(rounded_box_section(0.1, 0.08, 0.025), 0.2, (0.0, 0.0, 1.2), POSE),
 }
+
+
+def found_on(mesh: Mesh, **named: int) -> tuple[LinkFit, LinkFit]:
+    """Return the cones of a mesh and its sheets, as ``find_sheets`` makes both, by one search on shared samples."""
+    link, options = sampled(mesh, 6000), FitOptions(**named)
+    cones = fit_cones(link, options, lambda _: None)
+    return cones, with_developables(link, cones, options)
 
 
 def side_of(section: Section, tolerance: float = 1e-3):
@@ -63,8 +73,7 @@ def test_an_ellipse_becomes_the_circle_at_the_square_of_its_excess() -> None:
 def test_a_planted_tube_is_covered_and_lies_where_it_was_planted(name: str) -> None:
     """Facets stand inside by less than 0.04 mm; the sharpest corners here are followed within 0.15 mm."""
     tube = TUBES[name]
-    mesh = tube.mesh(around=160)
-    cones, fit = (find_sheets(mesh, round_only=only) for only in (True, False))
+    cones, fit = found_on(tube.mesh(around=160))
     (sheet,) = fit.sheets
     assert sheet.placed.bends
     assert sum(one.area_share for one in cones.sheets) + 0.05 < sheet.area_share
@@ -91,8 +100,7 @@ def test_noise_moves_a_side_by_less_than_itself() -> None:
 
 @pytest.mark.long
 def test_a_round_tube_stays_the_cone_that_it_was() -> None:
-    mesh = RuledTube(ellipse_section(0.05, 0.05), 0.2, pose=POSE).mesh()
-    cones, fit = (find_sheets(mesh, round_only=only) for only in (True, False))
+    cones, fit = found_on(RuledTube(ellipse_section(0.05, 0.05), 0.2, pose=POSE).mesh())
     assert [sheet.placed for sheet in fit.sheets] == [sheet.placed for sheet in cones.sheets]
     assert not fit.sheets[0].placed.bends
 
@@ -115,7 +123,7 @@ def test_the_second_of_two_ovals_is_bare_for_want_of_a_sheet() -> None:
     thin = RuledTube(stadium_section(0.025, 0.03), 0.15, pose=Pose.from_xyz_rpy((0.0, 0.0, 0.2))).mesh(around=160)
     faces = np.vstack([wide.faces, thin.faces + len(wide.vertices)])
     mesh = make_mesh(np.vstack([wide.vertices, thin.vertices]), faces)
-    one, two = (find_sheets(mesh, max_sheets=count) for count in (1, 2))
+    one, two = (found_on(mesh, max_sheets=count)[1] for count in (1, 2))
     assert (len(one.sheets), len(two.sheets)) == (1, 2)
     told = {area.reason: area.share for area in one.bare_areas}
     assert told["a sheet more would cover it: allow 2 sheets with 8 wires"] == pytest.approx(
