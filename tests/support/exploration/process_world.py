@@ -97,6 +97,9 @@ class _State(NamedTuple):  # a tuple, since it is compared and hashed a million 
     lost: int = 0  # beats in a row that were lost
 
 
+_FIRST = _State()
+
+
 class ProcessWorld:
     """The world.
 
@@ -113,7 +116,7 @@ class ProcessWorld:
         parts: Parts = Parts(),
         most_wrong: int = 2,
         without: tuple[str, ...] = (),
-        state: _State = _State(),
+        state: _State = _FIRST,
     ) -> None:
         self.control, self.parts, self.state = control, parts, state
         self.most_wrong, self.without = most_wrong, without
