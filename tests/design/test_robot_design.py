@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from coneskin.cli import main
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.design import pictures
 from coneskin.design.first_scene import _virtual, read_designs
 from coneskin.design.robot_design import _outside, _renumbered, design_robot
 from coneskin.design.sheets.cable_way import SheetBody
@@ -113,6 +114,7 @@ def test_one_scene_takes_the_sensors_of_all_links(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(pictures, "draw_pictures", lambda *_: [])  # of each link: tests/commands has them
     robot = write_robot(tmp_path, 0.42).rename(tmp_path / "ur10e.urdf")
     assert main(["design", f"{robot}#forearm_link", "--wires", "8", "-o", "skin"]) == 1
     assert "--wires is for a whole robot" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The studio in a browser: a handle is moved, a mesh is dropped and one chosen, layers lie flat beside, a folder is written."""
+"""The studio in a browser: a handle is moved, meshes are dropped and chosen, layers lie flat, a folder is written."""
 
 import tomllib
 from pathlib import Path
