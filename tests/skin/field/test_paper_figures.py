@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -45,32 +49,53 @@ def test_demo_prints_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert [round(row["residual"], 2) for row in printed["rows"][-2:]] == [-1.83, -1.19]
 
 
+class Drawn(NamedTuple):
+    """What the demo has written, drawn and said."""
+
+    folder: Path
+    figures: dict[str, Any]
+    out: str
+    err: str
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Drawn:
+    """One run with all pictures, which are small."""
+    module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
+    folder, figures, save = tmp_path_factory.mktemp("demo") / "new", {}, module.Figure.savefig
+
+    def savefig(self: Any, path: Path, **named: Any) -> None:
+        figures[path.stem] = self
+        save(self, path, **{**named, "dpi": 30})
+
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(module.Figure, "savefig", savefig)
+        assert main(["-o", str(folder), "--grid", "5"]) == 0
+    return Drawn(folder, figures, out.getvalue(), err.getvalue())
+
+
 @pytest.mark.long
-def test_demo_draws_every_figure(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("matplotlib")
-    assert main(["-o", str(tmp_path / "new"), "--grid", "5"]) == 0
-    names = sorted(p.name for p in (tmp_path / "new").iterdir())
+def test_demo_draws_every_figure(drawn: Drawn) -> None:
+    names = sorted(p.name for p in drawn.folder.iterdir())
     figures = [f"fig{n}.png" for n in ("04", "06", "09", "10", "11a", "11b", "11c", "12a", "12b", "12c", "16", "17")]
     assert names == [*figures, "table.csv", "table2.png"]
-    with (tmp_path / "new" / "table.csv").open(newline="") as file:
+    assert all(p.read_bytes().startswith(b"\x89PNG") for p in drawn.folder.glob("*.png"))
+    with (drawn.folder / "table.csv").open(newline="") as file:
         table = {row["what"]: row for row in csv.DictReader(file)}
     assert [(row.what, row.verdict) for row in rows(paper_model())] == [(w, r["verdict"]) for w, r in table.items()]
     (line,) = [row for what, row in table.items() if what.startswith("fig. 11b") and "15 mm and 10 deg" in what]
     assert (line["paper"], line["unit"], round(float(line["ours"]), 4)) == ("3.5", "mm", 3.0051)
     assert float(line["residual"]) == pytest.approx(3.5 - 3.0051, abs=1e-4)
-    out = capsys.readouterr()
-    assert "mean -1.90, spread 0.55; with r +0.17, with theta +0.00, with both -0.10" in out.out
-    assert "Inferred, not given in the paper" in out.out
-    assert "drawing" in out.err
+    assert "mean -1.90, spread 0.55; with r +0.17, with theta +0.00, with both -0.10" in drawn.out
+    assert "Inferred, not given in the paper" in drawn.out
+    assert "drawing" in drawn.err
 
 
 @pytest.mark.long
-def test_each_error_map_frames_the_areas_of_the_table(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_error_map_frames_the_areas_of_the_table(drawn: Drawn) -> None:
     """The picture reaches closer to the edges than the table, so it says both: its own largest error and theirs."""
-    figure_module = pytest.importorskip("matplotlib.figure", reason="the extra coneskin[pictures] is not installed")
-    figures = {}
-    monkeypatch.setattr(figure_module.Figure, "savefig", lambda self, path, **_: figures.update({path.stem: self}))
-    assert main(["-o", str(tmp_path), "--grid", "5"]) == 0
+    figures = drawn.figures
     for row in (row for row in rows(paper_model()) if " error, radius " in row.what):
         figure = figures[row.what[:8].replace(". ", "")]
         margins = row.what.rsplit(", ", 1)[1].replace(" and ", ", ")
