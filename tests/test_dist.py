@@ -12,6 +12,7 @@ import socket
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -227,7 +228,13 @@ def test_type_checkers_see_an_editable_install(tmp_path: Path) -> None:
 
 def test_the_simulated_controller_is_a_distribution_of_its_own(tmp_path: Path) -> None:
     """From a source distribution into an empty environment, where a client and a user's pytest meet it."""
-    run(sys.executable, "-m", "build", "-q", "packaging/sim-ur", cwd=copy(tmp_path / "coneskin"))
+    tree = copy(tmp_path / "coneskin")
+    needs = [
+        tomllib.loads((tree / name / "pyproject.toml").read_text())["build-system"]
+        for name in (".", "packaging/sim-ur")
+    ]
+    assert needs[0] == needs[1], "what is built alone above needs no more, and the build here makes no environment"
+    run(sys.executable, "-m", "build", "-q", "--no-isolation", "packaging/sim-ur", cwd=tree)
     (found,) = (tmp_path / "coneskin" / "packaging" / "sim-ur" / "dist").glob("*.whl")
     assert len(found.read_bytes()) < 250_000
     assert not [name for name, text in contents(found).items() if b"coneskin" in text and "dist-info" not in name]
