@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import ConvexHull
 
 from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit, find_cones
 from coneskin.geometry.frustum import unroll
-from coneskin.geometry.mesh import Mesh, load_mesh, make_mesh
+from coneskin.geometry.mesh import Mesh, load_mesh
 from tests.support.paths import SHARED_DATA
 from tests.support.sweep import sweep
 
@@ -213,20 +212,6 @@ def test_a_box_is_refused_and_the_nearest_thing_shown() -> None:
 
 
 @pytest.mark.long
-def test_a_convex_visual_mesh_is_taken_where_that_is_allowed() -> None:
-    """A stadium 0.6 m wide: its two half tubes of 30 mm are 11 % of it, too little for what may be a collision hull."""
-    phi = np.linspace(0.0, math.pi, 25)
-    arc = np.stack([0.3 + 0.03 * np.sin(phi), 0.03 * np.cos(phi)], axis=1)
-    rings = [np.column_stack([np.concatenate([arc, -arc]), np.full(50, z)]) for z in (0.0, 0.2)]
-    hull = ConvexHull(np.concatenate(rings))
-    body = make_mesh(hull.points, hull.simplices)
-    assert cones(body).sheets == ()
-    sheets = cones(body, allow_hull=True).sheets
-    # as far as the tolerance lets a sheet go over the flats, for a larger one
-    assert [sheet.frustum.radius1 for sheet in sheets] == pytest.approx([0.03, 0.03], abs=1e-3)
-
-
-@pytest.mark.long
 def test_a_link_shorter_than_a_sheet_is_told_so() -> None:
     fit = find_cones(placed(frustum(0.005, 0.005, 0.018)))
     assert fit.reason == "the link is 18.0 mm long, but a sheet needs at least 25 mm"
@@ -252,7 +237,7 @@ def test_a_bent_thing_is_refused_without_blaming_a_hull() -> None:
 
 @pytest.mark.long
 def test_the_slow_rays_give_the_same_sheets(monkeypatch: pytest.MonkeyPatch) -> None:
-    body = placed(frustum(0.05, 0.04, 0.3, segments=32, rings=1))
+    body = placed(frustum(0.05, 0.04, 0.3, segments=32))
     fast = find_cones(body)
     monkeypatch.setitem(body.__dict__, "embree_intersector", None)
     slow = find_cones(body)
@@ -320,11 +305,10 @@ def test_a_looser_tolerance_is_never_worse() -> None:
 
 @pytest.mark.long
 def test_what_is_advised_works_when_followed() -> None:
-    for body in (box(0.06, 0.07, 0.2), revolve([(0.0, 0.04), (0.05, 0.06), (0.1, 0.04)], segments=9)):
-        mesh = placed(body)
-        fit = cones(mesh)
-        assert fit.sheets == ()
-        assert cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
+    mesh = placed(revolve([(0.0, 0.04), (0.05, 0.06), (0.1, 0.04)], segments=9))
+    fit = cones(mesh)
+    assert fit.sheets == ()
+    assert cones(mesh, tolerance=float(f"{1e3 * fit.needed_tolerance:.2f}") * 1e-3).sheets
 
 
 @pytest.mark.long
