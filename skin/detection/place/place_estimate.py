@@ -152,6 +152,11 @@ _ROUND_INEQUALITY: Final = 0.05  # of the dipole; inequality that an edge next t
 # what the multipoles beyond the dipole are, by the dipole's area: of the displacement, over the distance to the edge
 # squared; and of the taper, by its curvature squared (root mean squares of the difference to the exact field)
 _NEXT_IMAGE, _NEXT_TAPER = 0.02, 0.05
+_LONG_INEQUALITY: Final = 0.15  # of the dipole; at an edge a round contact of 15 mm shows .07, two of 5 mm in a row 1.4
+_LONG_STEPS: Final = 5  # of the equation for half a length, each with an error of half the one before at most
+# deviations of a long contact's middle, of half its length: its parts share the current unevenly, as none can know. One
+# with twice the other's conductance is off by .2 to .35 along the line; a bent one, or a taper, moves it across
+_UNEVEN_ALONG, _UNEVEN_ACROSS = 0.15, 0.04
 _EDGE_MARGIN: Final = 1e-4  # of a side; the edge itself has no gradient
 _MAX_STEP: Final = 0.03  # of a side; a displacement is smaller, save of what is no contact
 
@@ -179,6 +184,7 @@ class PlaceEstimate(NamedTuple):
     edge: (
         float  #: what place and edges add to c of a disc: less 2 pi/Rs times the Robin function, less ln of the stretch
     )
+    line: tuple[float, float] | None  #: of what is no disc: half length [m], direction from u towards phi [rad]
 
     def covariance(
         self, share: float, motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -229,6 +235,9 @@ class PlaceEstimator:
         )
         self.sheets = (0.0, 0.0)
         self._sum = 0.0
+        parts = sensor.electronics
+        count = parts.current_full_scale / parts.full_count / parts.supply_volts  # in siemens
+        self._count = 0.5 * count * math.hypot(self.length**2, self.breadth**2)  # of both currents, as an inequality
         self._floor = PlaceFloor(
             sensor.tolerance, (self.length, self.breadth), (sensor.radial_ohms, sensor.angular_ohms)
         )
@@ -294,6 +303,12 @@ class PlaceEstimator:
         mean = dipole.strength - (2.0 * weight - 1.0) * half
         a_xx, a_yy, a_xy = mean + half, mean - half, cross
 
+        unlike, reach, line = math.hypot(half, cross), 0.0, None
+        sure = unlike - self._count  # a converter is not straight to more than a count
+        if sure > _LONG_INEQUALITY * mean and sure * sure > _REAL_VARIANCE * (noise_unequal + noise_xy):
+            reach = _half_length(2.0 * unlike, 1.0 / matrix.conductance - robin, rs / (2.0 * math.pi))
+            line = stretch * reach, 0.5 * math.atan2(cross, half)
+
         move_x = move_y = size = 0.0
         for again in (False, True):
             if again:
@@ -330,6 +345,10 @@ class PlaceEstimator:
         yy += 2.0 * by_mean[1] * y_mean + neglected
         xy += by_mean[0] * by_mean[1] * var_mean + by_half[0] * by_half[1] * var_half
         xy += by_cross[0] * by_cross[1] * var_cross + by_mean[1] * x_mean + by_mean[0] * y_mean
+        if line:
+            along, across = (_UNEVEN_ALONG * reach) ** 2, (_UNEVEN_ACROSS * reach) ** 2
+            both, differ = 0.5 * (along + across), 0.5 * (along - across) / unlike
+            xx, xy, yy = xx + both + differ * half, xy + differ * cross, yy + both - differ * half
         stretch = math.exp(self.curvature * x)
         squared = stretch * stretch
         u, phi = self.place(matrix.x, matrix.y, move_x, move_y)
@@ -343,6 +362,7 @@ class PlaceEstimator:
             move_y,
             dipole,
             edge_c,
+            line,
         )
         return tuple.__new__(PlaceEstimate, values)
 
@@ -372,6 +392,21 @@ class PlaceEstimator:
 
     def _edge(self, x: float, y: float) -> float:
         return min(x, self.length - x, y, self.breadth - y)
+
+
+def _half_length(dipole: float, beyond: float, ohms: float) -> float:
+    """Return half the distance of two equal contacts that add a dipole: s^2 = A (1/G - gamma + (Rs/2 pi) ln 2s) [m].
+
+    Args:
+        dipole: A, along their line less across [S m^2].
+        beyond: 1/G - gamma, distances in metres [ohm]. What one adds to the other's potential is taken off 1/G.
+        ohms: Rs/(2 pi).
+    """
+    least = 0.5 * dipole * ohms  # of s^2; it has a bond without a gap
+    square = dipole * max(beyond, ohms)
+    for _ in range(_LONG_STEPS):
+        square = max(least, dipole * (beyond + 0.5 * ohms * math.log(4.0 * square)))
+    return math.sqrt(square)
 
 
 def _gain(seen: float, noise: float, prior: float) -> float:

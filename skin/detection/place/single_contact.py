@@ -34,11 +34,9 @@ DANGEROUS_ANGLE: Final = math.radians(20.0)
 
 _PAIR_DEVIATIONS: Final = 3.0  # standard deviations of the averaged noise that may stand against the evidence
 _PAIR_FRAMES: Final = 512  # frames; the average reaches back so far
-_LINE_DEVIATIONS: Final = 4.0  # standard deviations of an inequality that is one
 # ratio; a disc of 15 mm at an edge adds 1.04 times what the largest one may, contacts round it 1.17
 _DISC_TOLERANCE = 1.1
 _LARGEST_ANGLE: Final = 1.3 * DANGEROUS_ANGLE  # of a radius: a larger disc adds less than contacts at that angle
-_ROUND_UNEQUAL = 0.15  # of the mean rise; a round contact of 15 mm at an edge shows .07, two of 5 mm 20 mm apart 1.4
 _CERTAIN_SHARE: Final = 0.9  # of the limit; what is not certain must fall below it to become so
 
 _CURRENTS_UNKNOWN: Final = "the untouched drive currents are not known yet"
@@ -63,7 +61,6 @@ class SingleContactTest:
         parts, cone = sensor.electronics, sensor.frustum
         self._currents = currents
         aspect = currents.aspect
-        self._wrap = cone.wrap
         self._angles = (cone.wrap / DANGEROUS_ANGLE) ** 2
         # siemens at DANGEROUS_ANGLE for a count of current over a count of supply
         self._unit = parts.current_full_scale / parts.adc_volts * self._angles
@@ -132,29 +129,6 @@ class SingleContactTest:
             return _LARGE_CONTACT if mean - 0.5 * slack > widest or frames >= _PAIR_FRAMES else _TOO_FEW_FRAMES
         self._certain = True
         return ""
-
-    def elongation(self, conductance: float) -> tuple[float, float] | None:
-        """Return half the length [m] and the direction of the line on which the contacts lie. None where none shows.
-
-        The length is that of two equal contacts of no extent, measured around the narrower end. How the contacts share
-        the conductance is not identifiable: unequal ones are farther apart.
-
-        Args:
-            conductance: of all contact [S].
-
-        Returns:
-            half the length [m], and the angle from u towards growing phi [rad], within a right angle.
-        """
-        (frames, differ, across, mean, _, _), learned = self._evidence, self._currents.means[0]
-        if not frames or not learned or not conductance > 0.0:
-            return None
-        variance, bias = self._currents.spread
-        noise = self._scale * math.sqrt(variance * (1.0 / frames + 1.0 / learned))
-        seen = math.hypot(differ, across)
-        if seen < _LINE_DEVIATIONS * noise + self._unit * bias + _ROUND_UNEQUAL * max(0.0, mean):
-            return None
-        around = math.sqrt(seen / self._angles / conductance) * self._wrap  # [rad], of the circle about the axis
-        return around * self._radius1, 0.5 * math.atan2(across, -differ)
 
 
 def _split_noise(sensor: Sensor, aspect: float) -> float:

@@ -80,7 +80,7 @@ class TouchPlace:
         # frames for which the estimate serves, in all when it is made anew, conductance of which it was made [S]
         self._due: tuple[int, float, float] = 0, 1.0, 0.0
         self.altered = ""
-        self._located = False
+        self._located = self._doubted = False
         self._began = 0.0
         self._newest: tuple[float, float] | None = None
         self._first: tuple[float, float] | None = None  # where its evidence began
@@ -145,9 +145,11 @@ class TouchPlace:
             estimate, steady = self._solve(frame, now, period), True
         u, phi = self._placed(x, y, estimate)
         doubt = self._doubt(reading, matrix, level, u, estimate)
-        if not (doubt or steady or self._located):  # the first certain place is told with its covariance
+        # the first certain place is told with its covariance; a length that a doubtful frame showed is looked at anew
+        if not doubt and (not (steady or self._located) or (self._doubted and estimate.line is not None)):
             estimate, steady = self._solve(frame, now, period), True
             u, phi = self._placed(x, y, estimate)
+        self._doubted = bool(doubt)
         covariance = estimate.covariance(track.share, track.motion)
         step_x, step_y = track.velocity
         rate = 1.0 / period if period > 0.0 else 0.0
@@ -164,7 +166,7 @@ class TouchPlace:
         values = (
             *(now, level, u, phi, not doubt, doubt, frame.clock_us, frame.sequence),
             *(covariance if steady else None, *(estimate.radius() if steady else (None, None))),
-            *(self._single.elongation(whole) if doubt else None, velocity),
+            *(estimate.line if doubt else None, velocity),
         )
         return tuple.__new__(TouchReading, values)  # quicker than TouchReading()
 

@@ -118,3 +118,35 @@ def test_a_long_contact_at_an_edge_is_found_at_its_middle(along, around):
         one = FrameNoise(sensor).of(matrix, frame, NOISE**2 + 1.0 / 12.0)
         place = estimator.estimate(matrix, one, 1.0, SheetConductances(*estimator.sheets, 0.0, 0.0))
         assert math.hypot(place.u - u, cone.radius_at(u) * (place.phi - phi)) < 0.06e-3  # 0.03 mm; counted twice: 0.2
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("ka", [1.0, 3.0])
+@pytest.mark.parametrize("ratio", [1.0, 0.5])
+def test_the_ellipse_of_a_long_contact_holds_the_middle_of_what_presses_unevenly(shape, ka, ratio):
+    """Two discs of 4 mm in any direction, one with a part of the other's conductance: their common centroid."""
+    cone, rng = SHAPES[shape], random.Random(f"{shape} {ka} {ratio}")
+    parts = Electronics(adc_bits=16, current_full_scale={"forearm": 0.0058, "paper": 0.0125}[shape])
+    sensor = Sensor(cone, upper_sheet_ohms=OHMS, lower_sheet_ohms=OHMS, electronics=parts, tolerance=IDEAL_SHEETS)
+    model, inversion = FieldModel(SectorSheet.of_frustum(cone), OHMS, OHMS, 1e-7), FrameInversion(sensor)
+    estimator, inside, count = PlaceEstimator(sensor), 0, 40
+    for _ in range(count):
+        half, turn, u = rng.uniform(0.006, 0.012), rng.uniform(0.0, math.pi), rng.uniform(0.02, cone.slant - 0.02)
+        along, around = half * math.cos(turn), half * math.sin(turn) / cone.radius_at(u)
+        edge = 0.02 / cone.radius_at(u)
+        phi = rng.uniform(edge, cone.wrap - edge)
+        firm = (ka / 0.004) ** 2 / (2.0 * OHMS)
+        pair = [u - along, u + along], [phi - around, phi + around]
+        y = model.admittance(model.contacts(*([side] for side in pair), 0.004, [[firm, ratio * firm]]))[0].tolist()
+        frame = frame_of(sensor, y, lambda: rng.gauss(0.0, NOISE))
+        matrix = inversion.invert(frame[6:18])
+        assert matrix is not None
+        one = FrameNoise(sensor).of(matrix, frame, NOISE**2 + 1.0 / 12.0)
+        place = estimator.estimate(matrix, one, 1.0, SheetConductances(*estimator.sheets, 0.0, 0.0))
+        true_u, true_phi = ((first + ratio * second) / (1.0 + ratio) for first, second in pair)
+        du, ds = place.u - true_u, cone.radius_at(true_u) * (place.phi - true_phi)
+        uu, us, ss = place.covariance(1.0)
+        inside += (ss * du * du - 2.0 * us * du * ds + uu * ds * ds) / (uu * ss - us**2) < 5.991
+        if place.line is not None and ratio == 1.0:
+            assert place.line[0] == pytest.approx(half, rel=0.25)  # .8 to 1.1 where they press firmly or at an edge
+    assert inside >= 0.95 * count
