@@ -16,7 +16,7 @@ With x and y parts of the sides, R the sheet's resistance from electrode to elec
 are variances of x. f = ln sec(pi peel/2)/pi is what the gap throttles; the rest of a peel is fitted to finite elements.
 h is the potential of the current that the two insulated edges turn back, a series of odd n:
 h = sum 4/(n pi)^2 sin(n pi x) sinh(n pi b (y - 1/2))/cosh(n pi b/2), b the breadth over the length. It is zero on the
-middle line, so it is taken further out, by 1.5 deviations of y. The drop of a line that is fed at one end grows from 0
+middle line, so it is taken further out, by two deviations of y. The drop of a line that is fed at one end grows from 0
 to 1/2: d = (1 - x)/3 + 2/pi^2 |cos(pi y)| exp(-pi x/b)/sqrt 2 has its mean and the first term of a series. Which end is
 fed is not told: the term counts as if it were the other, less what that is too much in the mean. The drops of two
 electrodes have one sign, and oppose each other.
@@ -34,7 +34,7 @@ LINE_SHARE: Final = 0.23  #: of a line's ohms: what a lead does like the mean dr
 PATCH_SHARE: Final = 0.11  #: of the variance of patches a third of a side wide: what a line through them sees
 _OPPOSED: Final = 4.0 / math.pi  # of the product of two drops, each the size of a Gaussian number
 _LINE_BEND: Final = math.sqrt(2.0) / math.pi**2  # of a line's ohms: how its drop differs from the mean one
-_SKEW_REACH: Final = 1.5  # deviations of a place; what grows with two errors at once has longer tails than one
+_SKEW_REACH: Final = 2.0  # deviations of a place; what grows with two errors at once has longer tails than one
 _PEEL_SHARE: Final = 0.092  # of the cube of a peel; variance at its electrode, over the breadth's square
 _PEEL_DECAY: Final = 13.4  # of that variance, over the distance in breadths
 _CONTACT_SHARE: Final = 0.25  # of the correction for a contact's size; none is a uniform disc

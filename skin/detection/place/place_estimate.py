@@ -225,7 +225,6 @@ class PlaceEstimator:
     def __init__(self, sensor: Sensor) -> None:
         cone = sensor.frustum
         self.curvature = cone.sin_half_angle / cone.radius1
-        self._slant = cone.slant
         self.breadth = cone.radius1 * cone.wrap
         self.length = math.log1p(self.curvature * cone.slant) / self.curvature if self.curvature else cone.slant
         self._per_y = cone.wrap
