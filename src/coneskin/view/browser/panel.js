@@ -30,7 +30,7 @@
     if (clock.dataset.share) all('.coneskin-cursor').forEach((line) => put(line.style, 'left', clock.dataset.share));
     all('#coneskin-traces select').forEach((choice) => put(choice, 'value', chosen));
     all('.coneskin-trace').forEach((trace, k) => put(trace, 'hidden', String(k) !== chosen));
-    all('.coneskin-plot').forEach(read);
+    all('.coneskin-pointer').forEach(read);
   }
   function showOnTop(words) {  // of the scene what is old; in a narrow window phase and card too, and the panel folded
     const top = document.getElementById('coneskin-top')
@@ -42,8 +42,9 @@
     if (handle && !folded) handle.click();  // of viser's panel for a narrow window
     folded = folded || Boolean(handle);
   }
-  function read(plot) {  // the values under the pointer
-    const box = plot.getBoundingClientRect(), line = plot.querySelector('.coneskin-pointer');
+  function read(line) {  // the values under the pointer
+    const plot = line.parentElement, place = plot.nextElementSibling, box = plot.getBoundingClientRect();
+    if (place === null) return;  // a file that the browser is still reading
     const share = pointer === null ? -1 : (pointer.clientX - box.left) / box.width;
     line.hidden = !(share >= 0 && share <= 1 && pointer.clientY >= box.top && pointer.clientY <= box.bottom);
     const words = line.hidden ? [] : all('path').filter((path) => plot.contains(path)).map((path) => {
@@ -57,9 +58,9 @@
     });
     const time = Number(plot.dataset.since) + share * (plot.dataset.until - plot.dataset.since);
     line.style.left = `${100 * share}%`;
-    put(plot.nextElementSibling, 'textContent', words.length ? `${time.toFixed(3)} s: ${words.join(', ')}` : '');
+    put(place, 'textContent', words.length ? `${time.toFixed(3)} s: ${words.join(', ')}` : '');
   }
-  addEventListener('pointermove', (event) => { pointer = event; all('.coneskin-plot').forEach(read); }, true);
+  addEventListener('pointermove', (event) => { pointer = event; all('.coneskin-pointer').forEach(read); }, true);
   addEventListener('change', (event) => {
     if (event.target.closest && event.target.closest('#coneskin-traces')) { chosen = event.target.value; follow(); }
   }, true);
