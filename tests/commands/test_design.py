@@ -114,11 +114,14 @@ def test_two_sheets_of_a_waist_are_trimmed_until_their_outer_faces_clear(tmp_pat
 
 
 @pytest.mark.long
-def test_a_seam_gap_opens_by_what_was_asked(tmp_path):
-    assert design(*CYLINDER, *sets("sheet.seam_gap_mm=1.5"), "-o", str(tmp_path / "out")) == 0
+@pytest.mark.parametrize(("wrap_deg", "gap_mm"), [(360.0, 1.5), (359.9, 1.5), (350.0, 9.4248), (300.0, 56.5487)])
+def test_a_seam_gap_opens_to_what_was_asked(tmp_path, wrap_deg: float, gap_mm: float) -> None:
+    """A search finds wraps of nearly a turn. One that leaves more than the gap stays as it is."""
+    words = [*CYLINDER, "--wrap-deg", str(wrap_deg), *sets("sheet.seam_gap_mm=1.5"), "-o", str(tmp_path / "out")]
+    assert design(*words) == 0
     cone = json.loads((tmp_path / "out" / "design.json").read_text())["sheets"][0]["link_cone"]
-    assert math.radians(360.0 - cone["wrap_deg"]) * 54.0 == pytest.approx(1.5, abs=1e-4)
-    assert cone["rpy_deg"][2] == pytest.approx((360.0 - cone["wrap_deg"]) / 2, abs=1e-4)
+    assert math.radians(360.0 - cone["wrap_deg"]) * 54.0 == pytest.approx(gap_mm, abs=1e-4)
+    assert cone["rpy_deg"][2] == pytest.approx((wrap_deg - cone["wrap_deg"]) / 2, abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,7 @@ class JigPlan:
 
 _LOWER_CONDUCTIVE, _UPPER_CONDUCTIVE = 1, 3  # indices of the layers in the stack
 _MOST_STRAIN = 0.4  # of a face of a wrapped layer; foam wrinkles or tears beyond
+_SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
 _STRAIGHT_SHARE = 0.02  # of the fit's tolerance; a taper below it is noise of the mesh, and the side a cylinder's
 
 
@@ -407,19 +408,19 @@ def _straightened(link: PlacedFrustum, tolerance: float) -> PlacedFrustum:
 
 
 def _seam_opened(link: PlacedFrustum, gap: float) -> PlacedFrustum:
-    """Return a full wrap with a gap of the seam [m], half of it on either side of phi = 0; a partial wrap as it is."""
+    """Return a wrap whose seam has at least a gap [m], half of it on either side; one without a seam as it is."""
     side = link.frustum
     narrow = min(side.radius1, side.radius2)
     if not (math.isfinite(gap) and gap >= 0.0):
         raise GeometryError(f"seam gap must be finite and not negative, got {gap * 1e3:.4g} mm; for a flap use overlap")
-    if gap == 0.0 or side.wrap < math.tau - 1e-9:
+    if gap == 0.0 or side.wrap <= _SEAM_TURN_SHARE * math.tau:
         return link
     if gap >= math.tau * narrow:
         raise GeometryError(
             f"seam gap of {gap * 1e3:.4g} mm takes the whole narrow end, {math.tau * narrow * 1e3:.4g} mm"
         )
-    turn = gap / narrow
-    return link.part(0.0, side.slant, 0.5 * turn, side.wrap - 0.5 * turn)
+    turn = gap / narrow - (math.tau - side.wrap)
+    return link.part(0.0, side.slant, 0.5 * turn, side.wrap - 0.5 * turn) if turn > 0.0 else link
 
 
 def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> PlacedFrustum:
@@ -428,9 +429,6 @@ def _active(place: PlacedFrustum, layout: SheetLayout, stack: LayerStack) -> Pla
     box = layout.field
     phi1, phi2 = (place.azimuth_above(height, phi) for phi in (box.phi1, box.phi2))
     return place.parallel(height).part(box.u1, box.u2, phi1, phi2)
-
-
-_SEAM_TURN_SHARE = 0.9  # of a turn; from there on a wrap has a seam rather than a side without a sheet
 
 
 def _blind_angle(design: SheetDesign) -> float:
