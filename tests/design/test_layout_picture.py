@@ -26,8 +26,8 @@ def test_dimensions_have_units_and_lines_a_legend() -> None:
     assert len(re.findall(r"\d mm", words)) == 7  # both sides, the slant, two arcs, two radii
     (legend,) = figure.legends
     named = {text.get_text() for text in legend.texts}
-    assert any(re.fullmatch(r"cable tie, (2[4-9]|3[0-6]) mm from the rim", name) for name in named)
-    assert any(re.fullmatch(r"connector, (5[4-9]|6[0-6]) mm from the rim", name) for name in named)
+    assert any(re.fullmatch(r"cable tie, (2[4-9]|3[0-6]) mm along the cable", name) for name in named)
+    assert any(re.fullmatch(r"connector, (5[4-9]|6[0-6]) mm along the cable", name) for name in named)
     assert {"upper conductive layer", "lower conductive layer", "substrates and isolation", "active area"} < named
     lines = [line for line in legend.get_lines() if line.get_marker() in ("", "None")]
     assert {line.get_linestyle() for line in lines} == {"-", "--", ":"}

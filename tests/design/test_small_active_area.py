@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from coneskin.cli import main
-from coneskin.design.link_design import design_link
+from coneskin.design.link_design import as_built, design_link
 from coneskin.design.report import report_text
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.design.sheets.summary import small_active_area
@@ -83,7 +83,11 @@ def test_widths_that_are_chosen_leave_most_active_but_for_the_holes(slant: float
 
 
 @pytest.mark.parametrize(
-    ("kept", "words"), [(1.0, "44% of the hull of the link\n"), (0.75, "33% of the hull .*, 11% less")]
+    ("kept", "words"),
+    [
+        (1.0, r"44% of the hull of the link\n(?!\* No sheet)"),
+        (0.75, r"33% of the hull .*\n\* No sheet on 11% .*: no room"),
+    ],
 )
 def test_the_report_tells_what_is_covered_as_built(kept: float, words: str) -> None:
     """A fit of 44 % of a link's hull, of which a sheet may have to leave a quarter to another or to wires."""
@@ -92,7 +96,10 @@ def test_the_report_tells_what_is_covered_as_built(kept: float, words: str) -> N
     fit = LinkFit((fitted,), None, 1e-3, 0.2, 0.1, (), "", 1)
     (built,) = design_sheets([place.part(0.0, kept * 0.2, 0.0, math.tau)], DesignOptions())
     design = replace(built, found=fitted)
+    fit = as_built(fit, (design,))
     assert re.search(words, report_text((design,), [measure_build(design, 0)], "tube", fit=fit))
+    # what is left is where the sheet ends early
+    assert all(0.15 <= z <= 0.2 for area in fit.bare_areas for z in area.points[:, 2])
 
 
 @pytest.mark.long
@@ -114,4 +121,6 @@ def test_each_sheet_and_all_together_tell_the_share_of_the_link_as_built(tmp_pat
     assert len(told) == 2
     assert design.fit is not None
     assert sum(sheet.area_share for sheet in design.fit.sheets) == pytest.approx(sum(told), abs=1e-4)
-    assert f" {sum(told):.0%} of the hull of the link, " in report
+    assert f" {sum(told):.0%} of the hull of the link\n" in report
+    bare = sum(area["share"] for area in design.data["bare_areas"])
+    assert sum(told) + bare == pytest.approx(1.0, abs=5e-3)  # less than that is not told

@@ -265,9 +265,11 @@ def _print(found: LinkDesign) -> None:
         if small := small_active_area(design):
             print(f"  warning: {small}")
     fit = found.fit
-    if fit is not None and fit.touch_weights:
-        share = sum(sheet.touch_share for sheet in fit.sheets)
-        print(f"weighed by {fit.touch_weights.name}, the sheets cover {share:.0%} of the hull")
+    if fit is not None:
+        print(f"the sheets cover {sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull")
+        if fit.touch_weights:
+            weighed = sum(sheet.touch_share for sheet in fit.sheets)
+            print(f"weighed by {fit.touch_weights.name}, that is {weighed:.0%} of it")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")
 

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from coneskin.geometry.fit.cones import LinkFit
     from coneskin.geometry.fit.touch_weights import TouchWeights
 
+_LEAST_LEFT = 0.005  # of the hull, of what sheets leave as they are built
+_LEFT_GRID = (24, 96)  # points of a sheet along and around
+_LEFT_REASON = "no room there for a sheet as it is built, with its seam, its wires and its neighbors"
 #: words in the name of a file or folder
 _VISUAL_WORDS, _HULL_WORDS = {"visual", "visuals"}, {"collision", "collisions", "hull", "hulls", "convex"}
 
@@ -190,6 +193,31 @@ def with_seams(
     for reason in reasons:
         progress(reason)
     return replace(source, notes=(*source.notes, *reasons)), fit
+
+
+def as_built(fit: LinkFit, sheets: Sequence[SheetDesign]) -> LinkFit:
+    """Return a fit with its sheets as they are built. What is left of them is one more area without a sheet."""
+    import numpy as np
+
+    from coneskin.geometry.fit.bare_areas import BareArea
+
+    built = tuple(sheet.fit for sheet in sheets if sheet.fit is not None)
+    share = sum(one.area_share for one in fit.sheets) - sum(one.area_share for one in built)
+    if share < _LEAST_LEFT:
+        return dataclasses.replace(fit, sheets=built)
+    places, left = {id(sheet.found): sheet.place for sheet in sheets}, []
+    for one in fit.sheets:
+        side = one.frustum
+        grid = np.meshgrid(np.linspace(0.0, side.slant, _LEFT_GRID[0]), np.linspace(0.0, side.wrap, _LEFT_GRID[1]))
+        points = one.placed.place(*grid)[0].reshape(-1, 3)
+        if (place := places.get(id(one))) is not None:
+            u, phi, _ = place.locate_all(points)
+            parts = u / place.frustum.slant, phi / place.frustum.wrap
+            points = points[np.any([np.abs(part - 0.5) > 0.5005 for part in parts], axis=0)]
+        left.append(points)
+    return dataclasses.replace(
+        fit, sheets=built, bare_areas=(*fit.bare_areas, BareArea(_LEFT_REASON, share, np.concatenate(left)))
+    )
 
 
 class NothingFits(GeometryError):
@@ -356,7 +384,7 @@ def design_link(
         sheets, left_out = design_assembly(fit, options, mesh)
         if not sheets:
             raise GeometryError("there is no sheet to design: " + "; ".join(left_out))
-        fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
+        fit = as_built(fit, sheets)
         notes = (*notes, *left_out)
         for note in left_out:
             progress(f"note: {note}")

@@ -80,11 +80,9 @@ def _coverage(fit: LinkFit, designs: Sequence[SheetDesign]) -> Iterator[str]:
     axes = len({sheet.axis for sheet in built})
     count = "1 sheet covers" if len(built) == 1 else f"{len(built)} sheets cover"
     share = sum(sheet.area_share for sheet in built)
-    lost = sum(design.found.area_share for design in designs if design.found is not None) - share
-    less = f", {lost:.0%} less than they could: they leave room for each other, seams and wires"
     yield (
         f"* {count}, within {fit.tolerance * 1e3:g} mm of the mesh and about {axes} ax{'i' if axes == 1 else 'e'}s, "
-        f"{share:.0%} of the hull of the link{less if lost >= 0.005 else ''}"
+        f"{share:.0%} of the hull of the link"
     )
     if fit.touch_weights:
         share = sum(sheet.touch_share for sheet in built)

@@ -28,7 +28,7 @@ from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_links
 
 from .folder import DESIGN_FILE, FileOptions, _Draft, _measured, _nested, _new_folder, check_target
-from .link_design import LinkDesign, _fit_link, room_for
+from .link_design import LinkDesign, _fit_link, as_built, room_for
 from .report import _table
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
@@ -163,8 +163,7 @@ def _assembled(
     sheets, left_out = design_assembly(fit, named, design.mesh, beside=beside)
     numbers = [number for sheet in sheets for number, one in fits.items() if one is sheet.found]
     notes = (*_renumbered(design.notes, numbers), *left_out)
-    fit = dataclasses.replace(fit, sheets=tuple(sheet.fit for sheet in sheets if sheet.fit is not None))
-    return dataclasses.replace(design, sheets=sheets, fit=fit, notes=notes)
+    return dataclasses.replace(design, sheets=sheets, fit=as_built(fit, sheets), notes=notes)
 
 
 def _renumbered(notes: Sequence[str], numbers: Sequence[int]) -> Iterator[str]:

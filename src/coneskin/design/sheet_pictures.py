@@ -114,7 +114,7 @@ def _draw_cable(
         (way.tie + 1, "s", "cable tie", way.tie_length),
         (-1, "D", "connector", way.connector_length),
     ):
-        label = f"{word}, {1e3 * length:.0f} mm from the rim"
+        label = f"{word}, {1e3 * length:.0f} mm along the cable"
         axes.plot(*zip(led[index], strict=True), marker, color=INK_COLOUR, ms=6, ls="", label=label)
     return led
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from coneskin.core.errors import GeometryError
 from coneskin.design.folder import write_design
-from coneskin.design.link_design import LinkMesh, find_link_sheets, load_link, room_for, with_seams
+from coneskin.design.link_design import LinkMesh, as_built, find_link_sheets, load_link, room_for, with_seams
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.cones import LinkFit
@@ -275,7 +275,7 @@ class Workbench:
         data = write_design(
             folder,
             self.designs,
-            fit=self._fit,
+            fit=as_built(self._fit, self.designs),
             mesh=self.link.mesh,
             title=self.link.name,
             source=self.link.mesh.source,
