@@ -134,7 +134,10 @@ def measure_displacement(
     inset = 1e-6 * f.slant
     height = heights_by_ray(rays or RayCaster(mesh), placed, np.clip(u, inset, f.slant - inset), phi, limit)
     if not (np.abs(height) <= limit).any():
-        raise GeometryError(f"{mesh.source}: no part of it lies within {limit * 1e3:g} mm of the sheet")
+        raise GeometryError(
+            f"{mesh.source}: no part of it lies within {limit * 1e3:g} mm of the sheet: is it another link's, or is "
+            "the sheet placed elsewhere?"
+        )
     # the closing needs values that grow outwards from 0, where there is no surface
     depth = 4.0 * limit + 0.05 * max(f.radius1, f.radius2)
     shown = np.where(height > -depth, height + depth, 0.0)

@@ -54,9 +54,15 @@ class SheetFlaws:
 
     def __post_init__(self) -> None:
         if not (abs(self.slope) + abs(self.slope_across) < 1.5 and 0.0 <= self.patches < 0.3):
-            raise SensorError(f"the resistance of a sheet must stay above 0, got {self}")
+            found = f"{self.slope:.3g}, {self.slope_across:.3g} and {self.patches:.3g}"
+            raise SensorError(
+                f"slopes must together be less than 1.5, and patches from 0 to less than 0.3, got {found}"
+            )
         if not (self.skew**2 < 1.0 + self.stretch and 0.0 <= self.peeled < 1.0 and min(self.lines) >= 0.0):
-            raise SensorError(f"a sheet must conduct in all directions, from both electrodes, got {self}")
+            found = f"{self.skew:.3g}, {self.stretch:.3g}, {self.peeled:.3g}, {min(self.lines):.3g}"
+            raise SensorError(
+                f"skew^2 must be less than 1 + stretch, peeled from 0 to less than 1, lines at least 0 ohm, got {found}"
+            )
 
     def resistance(self, x: Floats, y: Floats) -> Floats:
         """Return its resistance over that of the scene at parts of the sides."""

@@ -76,7 +76,7 @@ class EventName(StrEnum):
     NOT_COMMISSIONED = "not_commissioned", "The arm only stops, although its scene lets it move away. `what` says why."
     CONTACT = "contact", "A touch has begun."
     CONTACT_LOCATED = "contact_located", "The place of a touch has become certain."
-    CONTACT_EXTENDED = "contact_extended", "The touch is not one disc: its centroid and its line are known."
+    CONTACT_EXTENDED = "contact_extended", "The touch is not one disc: its middle and its line are estimated."
     TOUCH_ENDED = "touch_ended", "A touch is over."
     FAULT = "fault", "Something is wrong with the skin, the arm or a process."
     STOPPING = "stopping", "A stop was sent. `why` says what for."
