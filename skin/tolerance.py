@@ -58,7 +58,7 @@ class SheetTolerance:
         map_error: of a calibrated place along and around [m]. With it, the first five and the peel are taken off.
 
     Raises:
-        SensorError: a value is negative or not finite.
+        SensorError: a value is negative or not finite, or a whole electrode peels off.
     """
 
     slope: float = 0.0
@@ -77,6 +77,8 @@ class SheetTolerance:
             value = getattr(self, item.name)
             if value is not None and not (math.isfinite(value) and value >= 0.0):
                 raise SensorError(f"tolerance.{item.name} must be finite and not negative, got {value!r}")
+        if self.peel >= 1.0:
+            raise SensorError(f"tolerance.peel must be less than the whole electrode, 1, got {self.peel!r}")
 
 
 IDEAL_SHEETS: Final = SheetTolerance()
@@ -129,9 +131,9 @@ class PlaceFloor:
         yy += breadth * breadth * self._along(y, x, 1, wide) + length * length * self._peeled(y, wide)
         if self._skew:
             off = _SKEW_REACH * (math.sqrt(yy) / breadth + self._skew * abs(_turned_back(y, x, long)))
-            turned_x = self._skew * length * _turned_back(x, y + math.copysign(off, y - 0.5), wide)
+            turned_x = self._skew * length * _turned_back(x, _further_out(y, off), wide)
             off = _SKEW_REACH * (math.sqrt(xx) + abs(turned_x)) / length
-            turned_y = self._skew * breadth * _turned_back(y, x + math.copysign(off, x - 0.5), long)
+            turned_y = self._skew * breadth * _turned_back(y, _further_out(x, off), long)
             xx, yy = xx + turned_x * turned_x, yy + turned_y * turned_y
         return xx, xy, yy
 
@@ -153,6 +155,11 @@ class PlaceFloor:
             + self._lines[sheet] * lines
             + both * (self._slope * both + self._patches)
         )
+
+
+def _further_out(x: float, off: float) -> float:
+    """Return x, farther from the middle, but not beyond the edge, where the series grows without a bound."""
+    return min(1.0, max(0.0, x + math.copysign(off, x - 0.5)))
 
 
 def _turned_back(x: float, y: float, ratio: float) -> float:

@@ -156,7 +156,7 @@ _LONG_INEQUALITY: Final = 0.15  # of the dipole; at an edge a round contact of 1
 _LONG_STEPS: Final = 5  # of the equation for half a length, each with an error of half the one before at most
 # deviations of a long contact's middle, of half its length: its parts share the current unevenly, as none can know. One
 # with twice the other's conductance is off by .2 to .35 along the line; a bent one, or a taper, moves it across
-_UNEVEN_ALONG, _UNEVEN_ACROSS = 0.15, 0.04
+_UNEVEN_ALONG, _UNEVEN_ACROSS = 0.15, 0.1
 _EDGE_MARGIN: Final = 1e-4  # of a side; the edge itself has no gradient
 _MAX_STEP: Final = 0.03  # of a side; a displacement is smaller, save of what is no contact
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
+from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, PlaceFloor, SheetTolerance
@@ -98,6 +99,23 @@ def test_the_ellipse_of_the_floor_holds_19_of_20_places_of_sheets_drawn_from_the
             dx, dy = at_x[i, j] - x[i], at_y[i, j] - y[j]
             held.append((yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy) < 5.991)
     assert 0.93 < np.mean(held) < 0.98
+
+
+@pytest.mark.parametrize("ohms", [0.5, 3.0, 1000.0])
+def test_aslant_current_moves_no_place_by_more_than_at_an_edge(ohms: float) -> None:
+    """Half of the skew at most, by the sum of 4/(n pi)^2, also where leads of some ohms leave a place unknown."""
+    size = (0.24, 0.229)
+    skewed, straight = (PlaceFloor(replace(COATED_SHEETS, skew=s), size, (ohms, ohms)) for s in (0.03, 0.0))
+    for place in np.ndindex(9, 9):
+        x, y = (number / 8.0 for number in place)
+        more = np.subtract(skewed.at(x, y, 0.0, 0.0), straight.at(x, y, 0.0, 0.0))
+        assert 0.0 <= more[0] <= (0.5 * 0.03 * size[0]) ** 2
+        assert 0.0 <= more[2] <= (0.5 * 0.03 * size[1]) ** 2
+
+
+def test_a_tolerance_leaves_a_part_of_each_electrode_bonded() -> None:
+    with pytest.raises(SensorError, match="peel must be less than the whole electrode, 1, got 1"):
+        SheetTolerance(peel=1.5)
 
 
 @pytest.mark.parametrize(("size", "at", "number"), [((0.1, 1.0), (0.5, 1.0), 0), ((1.0, 0.1), (1.0, 0.5), 2)])
