@@ -131,9 +131,9 @@ class PlaceFloor:
         yy += breadth * breadth * self._along(y, x, 1, wide) + length * length * self._peeled(y, wide)
         if self._skew:
             off = _SKEW_REACH * (math.sqrt(yy) / breadth + self._skew * abs(_turned_back(y, x, long)))
-            turned_x = self._skew * length * _turned_back(x, _further_out(y, off), wide)
+            turned_x = self._skew * length * _turned_back(x, y, wide, off)
             off = _SKEW_REACH * (math.sqrt(xx) + abs(turned_x)) / length
-            turned_y = self._skew * breadth * _turned_back(y, _further_out(x, off), long)
+            turned_y = self._skew * breadth * _turned_back(y, x, long, off)
             xx, yy = xx + turned_x * turned_x, yy + turned_y * turned_y
         return xx, xy, yy
 
@@ -157,14 +157,9 @@ class PlaceFloor:
         )
 
 
-def _further_out(x: float, off: float) -> float:
-    """Return x, farther from the middle, but not beyond the edge, where the series grows without a bound."""
-    return min(1.0, max(0.0, x + math.copysign(off, x - 0.5)))
-
-
-def _turned_back(x: float, y: float, ratio: float) -> float:
-    """Return h: two terms of the series."""
-    total = 0.0
+def _turned_back(x: float, y: float, ratio: float, off: float = 0.0) -> float:
+    """Return h so much farther out, two terms of the series. Beyond an edge it would grow without a bound."""
+    y, total = min(1.0, max(0.0, y + math.copysign(off, y - 0.5))), 0.0
     for n in (1.0, 3.0):
         k = n * math.pi
         bent = k * ratio * (y - 0.5)

@@ -268,8 +268,7 @@ def _print(found: LinkDesign) -> None:
     if fit is not None:
         print(f"the sheets cover {sum(sheet.area_share for sheet in fit.sheets):.0%} of the hull")
         if fit.touch_weights:
-            weighed = sum(sheet.touch_share for sheet in fit.sheets)
-            print(f"weighed by {fit.touch_weights.name}, that is {weighed:.0%} of it")
+            print(f"weighed by {fit.touch_weights.name}, that is {sum(s.touch_share for s in fit.sheets):.0%} of it")
     for area in fit.bare_areas if fit else ():
         print(f"no sheet: {area.share:.0%} of the hull: {area.reason}")
 

@@ -215,9 +215,8 @@ def as_built(fit: LinkFit, sheets: Sequence[SheetDesign]) -> LinkFit:
             parts = u / place.frustum.slant, phi / place.frustum.wrap
             points = points[np.any([np.abs(part - 0.5) > 0.5005 for part in parts], axis=0)]
         left.append(points)
-    return dataclasses.replace(
-        fit, sheets=built, bare_areas=(*fit.bare_areas, BareArea(_LEFT_REASON, share, np.concatenate(left)))
-    )
+    bare = BareArea(_LEFT_REASON, share, np.concatenate(left))
+    return dataclasses.replace(fit, sheets=built, bare_areas=(*fit.bare_areas, bare))
 
 
 class NothingFits(GeometryError):
