@@ -75,10 +75,8 @@ def _difference(qd: Joints, commanded: Joints) -> float:
 
 _SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoint queues
 _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
-
-
-# m/s of a surface that no skin covers, outward, where the scene allows that: a rigid thing stops it within 0.1 mm
-_MAX_BARE_SPEED = 0.008
+_MAX_BARE_SPEED = 0.008  # m/s outward of what no skin covers, where allowed: a rigid thing stops it within 0.1 mm
+_MAX_BARE_RATIO = 1.5  # of that speed to the touched surface's, where the arm gives way: a light push finds it slow
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
 
@@ -263,9 +261,10 @@ class MotionStream:
         if not self._allowed:
             return _bare_way(bare, self._start, ahead) or step
         speed = bare.way(state.q, ahead)[0] / _BARE_STEP
-        if speed <= _MAX_BARE_SPEED:
+        most = min(_MAX_BARE_SPEED, _MAX_BARE_RATIO * step.away) if self.how else _MAX_BARE_SPEED
+        if speed <= most:
             return step
-        share = _MAX_BARE_SPEED / speed
+        share = most / speed
         by = (*step.clipped_by, "bare side")
         return replace(step, qd=tuple(share * v for v in step.qd), away=share * step.away, clipped_by=by)
 

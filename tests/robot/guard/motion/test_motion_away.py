@@ -4,12 +4,16 @@ import math
 
 import pytest
 
+from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.robot.driver.messages import SetJointVelocity
-from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, StopPath
+from coneskin.robot.driver.values import ControllerState, JointVelocitySetpoint, SetpointProgram, StopPath
+from coneskin.robot.guard.motion.setpoint_stream import ReactionPlanner
 from coneskin.robot.guard.phase import Phase
+from coneskin.robot.guard.signals.joint_current import _push_torque
+from coneskin.robot.reaction.bare_side import BareSides
 from coneskin.robot.reaction.rules import Rule
-from coneskin.robot.reaction.types import Reaction
-from tests.support.guard_rig import GuardRig, felt, touch
+from coneskin.robot.reaction.types import ArmState, ContactOnLink, Reaction
+from tests.support.guard_rig import MODEL, GuardRig, felt, touch
 from tests.support.sweep import sweep
 
 from ..reactions import comply
@@ -218,3 +222,22 @@ def test_from_a_second_hand_behind_it_stays():
     assert rig.names.count("retreating") == 1
     assert rig.core.phase is Phase.LATCHED
     assert rig.names.count("stopping") == 2
+
+
+@pytest.mark.promise("P38")
+@pytest.mark.parametrize(("force", "most"), [(4.0, 0.004), (30.0, 0.008)])
+def test_with_a_bare_side_that_may_lead_a_light_push_finds_the_arm_slow(force, most):
+    """At 8 mm/s, a wall behind the wrist took 10 N before the arm felt it, whoever pushed with 5.5 N."""
+    q, near_shoulder = (0.0, -1.2, 1.5, -1.6, -1.5, 0.3), ContactOnLink(2, (0.3, 0.06, 0.1), (0.0, 1.0, 0.0), 0.9)
+    bare, out = BareSides(MODEL, []), []
+    planner = ReactionPlanner(MODEL, bare=bare)
+    planner.torque.now = tuple(force * turn for turn in _push_torque(MODEL, q, near_shoulder))
+    here = ArmState(0.0, q)
+    motion = planner.begin(comply(bare_side="allowed"), here, here, [near_shoulder], out)
+    for k in range(100):
+        now = 0.002 * (k + 1)
+        state = ControllerState(now, now, q, ZERO_VELOCITY, True, False, True)
+        assert motion.update(state, [near_shoulder], out) is None
+    qd = next(one.qd for one in reversed(out) if isinstance(one, SetJointVelocity))
+    way, _ = bare.way(q, [a + 0.01 * v for a, v in zip(q, qd, strict=True)])
+    assert way / 0.01 == pytest.approx(most, rel=0.02)
