@@ -17,7 +17,7 @@ from coneskin.geometry.pose import Vector
 from .kinematics import LINK_INDEX, dh_mesh, link_poses
 from .model import ArmModel, Joints
 from .models import MODEL_NAMES, arm_model, is_ur
-from .vectors import dot, minus
+from .vectors import added, dot, minus, scaled
 
 #: distance kept from a joint's limit [rad]
 _LIMIT_MARGIN = 0.02
@@ -166,6 +166,25 @@ def _to_segment(p: Vector, a: Vector, b: Vector) -> float:
     length = dot(along, along)
     share = min(1.0, max(0.0, dot(from_a, along) / length)) if length > 0.0 else 0.0
     return math.dist(p, (a[0] + share * along[0], a[1] + share * along[1], a[2] + share * along[2]))
+
+
+_CRUSHING_GAP = 0.12  # m; a wider one crushes no person's arm (ISO 13854)
+
+
+def part_in_front(model: ArmModel, q: Sequence[float], link: int, point: Vector, normal: Vector) -> str:
+    """Return which part of the arm is too close in front of a point on a link, at q [rad]. Empty for none.
+
+    It reaches into a ball as wide as ``_CRUSHING_GAP`` that touches the link at that point [m], and lies nearer to the
+    ball's middle than to the point. Point and outward unit normal are in the link's DH frame.
+    """
+    poses = link_poses(model, q)
+    place, middle = (poses[link].apply(added(point, scaled(normal, way))) for way in (0.0, 0.5 * _CRUSHING_GAP))
+    for name, number, first, last in arm_parts(model):
+        begin, end = poses[number].apply(first), poses[number].apply(last)
+        near = min(0.5 * (_CRUSHING_GAP + _clearance_needed(model)), _to_segment(place, begin, end))
+        if _to_segment(middle, begin, end) < near:
+            return name
+    return ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.arm.workspace import ArmSweep, Workspace
+from coneskin.robot.arm.workspace import ArmSweep, Workspace, part_in_front
 
 from .contact_supervision import clamped, opposed
 from .retreat import DISTANCE_TOLERANCE, RetreatPlan, plan_retreat, retreat_step
@@ -23,6 +23,7 @@ _PUSH_DAMPING = 1500.0  # N s/m; between a push that the joints feel and the spe
 _MAX_CARRIED = 15.0  # N that something else may take off a push whose touch does not become lighter
 _FOLLOWED_SHARE = 0.5  # of a firm push that is followed, while nothing takes anything off it
 _LIGHTER = 0.01  # of the level; six times its noise
+_MAX_STOPPING_WAY = 0.001  # m of any point of the arm; one that stops within it has squeezed nothing
 
 
 class _PushStep(NamedTuple):
@@ -180,9 +181,14 @@ def plan_reaction_motion(
         contacts: the touches, as they were last seen.
         space: the room that the arm has.
     """
+    sweep = ArmSweep.begin(model, state.q)
+    if sweep.distance(at_touch.q) > _MAX_STOPPING_WAY:
+        for contact in contacts:
+            if part := part_in_front(model, state.q, contact.link, contact.point, contact.normal):
+                return f"while it stopped, the arm may have caught what touches it against its own {part}"
     if reaction.kind == "comply":
         return _AdmittanceMotion(model, state, reaction, space)
     if clamped(contacts):
         return "touches on opposite sides, or on two links, may hold the arm between them"
-    plan = plan_retreat(model, at_touch, contacts, reaction, space, ArmSweep.begin(model, state.q))
+    plan = plan_retreat(model, at_touch, contacts, reaction, space, sweep)
     return plan.reason if isinstance(plan, Done) else _PlannedMotion(plan)
