@@ -118,10 +118,8 @@ class RobinFunction:
         total = both * (corner - self._inner) - far * s
         d_s, d_p = both * slope.real - far, -both * slope.imag
         if across != along:
-            (end, slope_s), (edge, slope_p) = (
-                self._logarithm(complex(math.exp(-2.0 * s))),
-                self._logarithm(cmath.exp(-2j * p)),
-            )
+            end, slope_s = self._logarithm(complex(math.exp(-2.0 * s)))
+            edge, slope_p = self._logarithm(cmath.exp(-2j * p))
             differ = across - along
             total -= differ * (end - edge)
             d_s -= differ * slope_s.real

@@ -145,12 +145,12 @@ def frame_at(data: bytes, offset: int = 0) -> Frame | None:
     piece = data[offset : offset + layout.length]
     if len(piece) != layout.length or crc_hqx(piece, 0):
         return None
-    return _read(layout, piece, 0)
+    return _read(layout, piece)
 
 
-def _read(layout: _Layout, data: bytes, offset: int) -> Frame:
+def _read(layout: _Layout, piece: bytes) -> Frame:
     """Return the frame of a checked piece."""
-    values: tuple[Any, ...] = layout.read.unpack_from(data, offset)
+    values: tuple[Any, ...] = layout.read.unpack(piece)
     if layout is _ONE_SUPPLY:
         supply = values[_SUPPLY_AT]
         values += (supply, supply, None)
@@ -208,7 +208,7 @@ class FrameDecoder:
         layout = _LAYOUT_BY_HEADER.get(data[:4])
         if layout is not None and len(data) == layout.length and not self._rest and not crc_hqx(data, 0):
             self.frames += 1
-            return [_read(layout, data, 0)]
+            return [_read(layout, data)]
         return self._search(self._rest + data)
 
     def _search(self, data: bytes) -> list[Frame]:
@@ -228,9 +228,10 @@ class FrameDecoder:
             plausible = layout is not None if version == VERSION else _MIN_LENGTH <= length <= MAX_LENGTH
             if plausible and end - at < length:
                 break
-            if plausible and not crc_hqx(data[at : at + length], 0):
+            piece = data[at : at + length]
+            if plausible and not crc_hqx(piece, 0):
                 if layout is not None:
-                    found.append(_read(layout, data, at))
+                    found.append(_read(layout, piece))
                 else:
                     self.unknown_versions += 1
                     self.last_unknown_version = version

@@ -182,13 +182,15 @@ def _frames(model: ArmModel, q: Sequence[float], last: int) -> list[_Frame]:
 
 
 def _combined(x: Vector, y: Vector, z: Vector, by: Vector, start: Vector = (0.0, 0.0, 0.0)) -> Vector:
-    (a, b, c), (p, q, r) = by, start
+    a, b, c = by
+    p, q, r = start
     return p + x[0] * a + y[0] * b + z[0] * c, q + x[1] * a + y[1] * b + z[1] * c, r + x[2] * a + y[2] * b + z[2] * c
 
 
 def _turned(u: Vector, v: Vector, c: float, s: float) -> tuple[Vector, Vector]:
     """Turn two axes in their own plane from u towards v."""
-    (ux, uy, uz), (vx, vy, vz) = u, v
+    ux, uy, uz = u
+    vx, vy, vz = v
     return ((ux * c + vx * s, uy * c + vy * s, uz * c + vz * s), (vx * c - ux * s, vy * c - uy * s, vz * c - uz * s))
 
 

@@ -416,7 +416,8 @@ class GuardCore:
 
     def _poll(self, now: float, out: Outputs) -> None:
         """Decide what only the passing of time shows."""
-        self._folding.poll(now, out)
+        if now >= self._folding.due:
+            self._folding.poll(now, out)
         fair = self._fair
         for event in self._stream.silence(fair, self._limits.skin_silence):
             self._feed_event(event, out)

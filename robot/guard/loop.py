@@ -264,7 +264,8 @@ class GuardLoop:
     def poll(self, timeout: float) -> None:
         """Wait for the skin, or for the timeout [s], and serve what has come."""
         ready = self._wait(timeout)
-        ports, (before, sleepless_before) = self._ports, self._round
+        ports = self._ports
+        before, sleepless_before = self._round
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
         if now - before > MIN_STALL or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)

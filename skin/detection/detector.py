@@ -62,9 +62,10 @@ class _StuckValues:
         """Take a frame. Tell whether one of its values is stuck."""
         if not self._most:
             return False
-        (a, b, c, d, e), (i, j, k, m, n), most = self._last, self._still, self._most
-        v, w, x, y, z = frame[11], frame[14], frame[15], frame[16], frame[17]  # two currents, and the supplies
-        # written out: compiled, a loop over them takes as long as all else that an untouched frame asks for
+        a, b, c, d, e = self._last
+        i, j, k, m, n = self._still
+        # two currents, and the supplies, written out: compiled, a loop over them is as slow as all else together
+        v, w, x, y, z, most = frame[11], frame[14], frame[15], frame[16], frame[17], self._most
         i, j, k = i + 1 if v == a else 0, j + 1 if w == b else 0, k + 1 if x == c else 0
         m, n = m + 1 if y == d else 0, n + 1 if z == e else 0
         self._last, self._still = (v, w, x, y, z), (i, j, k, m, n)

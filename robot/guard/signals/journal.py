@@ -323,11 +323,14 @@ class EventFolding:
 
     The first come as they are, then one with a count, at growing intervals: a loose plug made 410 000 events in
     a night, which bury the event that matters and fill the disk. None is lost: the next one counts those held back.
+
+    Attributes:
+        due: host time at which the next count is [s].
     """
 
     def __init__(self) -> None:
         self._kinds: dict[tuple[EventName, str], _Kind] = {}
-        self._due = math.inf  # when the next count is [s]
+        self.due = math.inf
 
     def emit(self, out: Outputs, name: EventName, about: str, now: float, **details: Any) -> None:
         """Put an event out, of a host time [s], or hold it back and count it.
@@ -350,18 +353,16 @@ class EventFolding:
             return
         kind.held += 1
         kind.details = details
-        self._due = min(self._due, kind.reported + kind.interval)
+        self.due = min(self.due, kind.reported + kind.interval)
 
     def poll(self, now: float, out: Outputs) -> None:
         """Report the counts that are due at a host time [s]."""
-        if now < self._due:
-            return
         for (name, _), kind in self._kinds.items():
             if kind.held and now >= kind.reported + kind.interval:
                 emit(out, name, now, **kind.details, count=kind.held)
                 kind.held, kind.reported = 0, now
                 kind.interval = min(2.0 * kind.interval, _MAX_INTERVAL)
-        self._due = min((kind.reported + kind.interval for kind in self._kinds.values() if kind.held), default=math.inf)
+        self.due = min((kind.reported + kind.interval for kind in self._kinds.values() if kind.held), default=math.inf)
 
     def flush(self, now: float, out: Outputs) -> None:
         """Report every count, and begin anew: what comes now matters."""

@@ -79,10 +79,9 @@ class FrameInversion:
         """
         lead_a, lead_b, lead_c, lead_d = self._a, self._b, self._c, self._d
         unit, load, pull = self._unit, self._input, self._pulldown
-        touch_c, touch_d, touch_current, radial_c, radial_d, radial = counts[:6]
-        angular_a, angular_b, angular, supply0, supply1, supply2 = counts[6:]
+        touch_c, touch_d, touch, radial_c, radial_d, radial, angular_a, angular_b, angular, rail0, rail1, rail2 = counts
         # potentials as fractions of the supply, currents over it [S]; into the sensor positive
-        scale = 1.0 / supply1
+        scale = 1.0 / rail1
         c1, d1, drive = radial_c * scale, radial_d * scale, radial * unit * scale
         ic1 = (c1 + d1) * load
         if self._b_positive:
@@ -92,7 +91,7 @@ class FrameInversion:
         v_d = d1 * self._d_seen
         h01, hx1, hy1 = v_b - v_d, v_a - v_b, v_d - c1 * self._c_seen
 
-        scale = 1.0 / supply2
+        scale = 1.0 / rail2
         a2, b2, drive = angular_a * scale, angular_b * scale, angular * unit * scale
         ic2 = -(a2 + b2) * load
         if self._c_positive:
@@ -102,7 +101,7 @@ class FrameInversion:
         v_b = b2 * self._b_seen
         h02, hx2, hy2 = v_b - v_d, a2 * self._a_seen - v_b, v_d - v_c
 
-        scale = 1.0 / supply0
+        scale = 1.0 / rail0
         c0, d0 = touch_c * scale, touch_d * scale
         ic0 = (c0 + d0) * pull
         determinant = hx1 * hy2 - hy1 * hx2
@@ -140,7 +139,7 @@ class FrameInversion:
             cross,
             around,
             cross2 - cross1,
-            touch_current * unit * scale - ic0,
+            touch * unit * scale - ic0,
             c0 - d0 - (outflow + outflow - ic0) / pull,
         )
         return tuple.__new__(ContactMatrix, values)  # quicker than ContactMatrix()
@@ -197,8 +196,8 @@ class FrameNoise:
         mix2 = (frame.angular_b - frame.angular_a) * scale * i1 * i2
         # the guides in the equations of the centre and of the sheets, and both in one
         load = self._input / matrix.conductance  # what a guide's input draws through the contact
-        guides1 = noise * ((y + load) ** 2 + (1.0 - y + load) ** 2)
-        guides2 = noise * ((x + load) ** 2 + (1.0 - x + load) ** 2)
+        near1, far1, near2, far2 = y + load, 1.0 - y + load, x + load, 1.0 - x + load
+        guides1, guides2 = noise * (near1 * near1 + far1 * far1), noise * (near2 * near2 + far2 * far2)
         split1, split2 = 2.0 * around * around * noise, 2.0 * along * along * noise
         # the supply in the same equations: in the first of each pair by the radial phase's, in the second the angular's
         supply1, supply2 = (1.0 - x if self._b_positive else x), (-y if self._c_positive else y - 1.0)

@@ -119,7 +119,10 @@ def read(
 
 def _fault(sensor: Sensor, frame: Frame, level: float, noise: float) -> Fault | None:
     """Return the first thing that is wrong with a frame whose supply is right, or None."""
-    touch_c, touch_d, current0, radial_c, radial_d, current1, angular_a, angular_b, current2 = frame[6:15]
+    # one by one: compiled, a part of a tuple is slow to take
+    touch_c, touch_d, current0 = frame[6], frame[7], frame[8]
+    radial_c, radial_d, current1 = frame[9], frame[10], frame[11]
+    angular_a, angular_b, current2 = frame[12], frame[13], frame[14]
     supply, supply1, supply2 = frame[15], frame[16], frame[17]
     bounds, limits = sensor.bounds, sensor.thresholds
     if frame[3] & _STATUS_FAULTS:

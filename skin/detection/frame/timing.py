@@ -139,7 +139,8 @@ class FrameTiming:
             now: host clock [s].
             elapsed: device time since the last frame [s].
         """
-        (device_time, quickest, gained, started), late = self._clocks, self.limits.late
+        device_time, quickest, gained, started = self._clocks
+        late = self.limits.late
         drift = elapsed * self._drift  # by which the clocks may have moved apart since the last frame
         device_time += elapsed
         offset = now - device_time  # host clock minus device time
@@ -166,7 +167,8 @@ class FrameTiming:
         return f"the device's clock is {pace} by more than clock_drift_ppm = {ppm:g}; a ceramic resonator needs 5000"
 
     def _judge_interval(self, steps: int, elapsed: float) -> Fault | None:
-        limits, (known, bucket), fault = self.limits, self._rhythm, None
+        known, bucket = self._rhythm
+        limits, fault = self.limits, None
         bucket = bucket - limits.missing_share if bucket > limits.missing_share else 0.0
         if steps > 1:
             self.missing += steps - 1

@@ -319,7 +319,9 @@ class UntouchedGuides:
         Args:
             supply: of a phase [counts].
         """
-        least, (radial, angular) = 0.5 * _HUM_RATIO * (self._currents.noise / supply) ** 2, self._hum
+        noise = self._currents.noise / supply
+        least = 0.5 * _HUM_RATIO * noise * noise
+        radial, angular = self._hum
         return radial if radial > least else 0.0, angular if angular > least else 0.0
 
     def contradict(self, frame: Frame, level: float, period: float) -> bool:
@@ -346,7 +348,8 @@ class UntouchedGuides:
             return (level - rest) * supply < _LEVEL_COUNTS and self._exceed_noise(
                 step1, step2, split1 / supply, split2 / supply, supply
             )
-        (hum1, hum2), most = self._hum, _MAX_GUIDE_GROWTH * period
+        hum1, hum2 = self._hum
+        most = _MAX_GUIDE_GROWTH * period
         hum1 += _HUM_WEIGHT * step1 * step1 - _HUM_MEMORY * hum1
         hum2 += _HUM_WEIGHT * step2 * step2 - _HUM_MEMORY * hum2
         self._hum = hum1, hum2

@@ -38,7 +38,6 @@ _MAX_RADIUS: Final = math.log(0.03)  # ln m
 _WEIGHT_KA: Final = 0.25 / 1.5**2  # of ln (ka)^2: a quarter over the variance of ln ka about 1
 _MAX_KA_WEIGHT: Final = 6.0  # a bond has an infinite ka, and is no less usual than this says
 _LAST_NODE: Final = 6
-_NODE_NUMBERS: Final = range(_LAST_NODE + 1)
 _MIN_C: Final = 0.003  # ka of 300: a bond
 _MIN_DISC_C: Final = 0.25  # of the largest disc that is one contact; less has a ring of firm contacts, or a larger one
 _NODE_WIDTH: Final = 0.35  # of the distance between a node's neighbours
@@ -82,64 +81,57 @@ def _weigh_dipole(
     shift = k * beyond - math.log(stretch)  # c = ln a + shift
     low = max(_MIN_C, _MIN_RADIUS + shift)
     high = max(_MAX_RADIUS + shift, low + 0.5)
-    z = math.sqrt(low)
-    step = (math.sqrt(high) - z) / _LAST_NODE
+    start = math.sqrt(low)
+    step = (math.sqrt(high) - start) / _LAST_NODE
     # exp(2 c) from node to node, c = z^2: its ratios grow by a constant ratio
-    power, ratio = k / (stretch * stretch) * math.exp(2.0 * (low - shift)), math.exp(2.0 * step * (2.0 * z + step))
-    growth = math.exp(4.0 * step * step)
-    nodes = []
-    for _ in _NODE_NUMBERS:
-        c = z * z
-        twice = 1.0 + c + c
-        off, ka = c - shift - _USUAL_RADIUS, math.log(twice / (c * c))
-        ka *= _WEIGHT_KA * ka
-        # the last is d ln a/dz, but for a factor
-        nodes.append(
-            (
-                power * _disc_share(c),
-                c - shift,
-                _WEIGHT_RADIUS * off * off + (ka if ka < _MAX_KA_WEIGHT else _MAX_KA_WEIGHT),
-                z,
-            )
-        )
-        power *= ratio
-        ratio *= growth
-        z += step
-    return _posterior(measured, variance, tolerated, nodes)
-
-
-def _posterior(
-    measured: float, variance: float, tolerated: float, nodes: list[tuple[float, float, float, float]]
-) -> _DipoleStrength:
-    """Weigh the measurement against a mixture of normal distributions about the nodes, as wide as these are apart."""
-    before, found, best = nodes[0][0], [], math.inf
-    for (strength, log_radius, unlikely, density), after in zip(nodes, [*nodes[1:], nodes[-1]], strict=True):
-        gap = _NODE_WIDTH * (after[0] - before)
-        width = gap * gap + _MODEL_VARIANCE * strength * strength
-        off, gain = measured - strength, 1.0 / (width + variance)
-        unlikely += off * off * gain
-        if unlikely < best:
-            best = unlikely
-        mean = strength + width * gain * off
-        found.append((unlikely, density * math.sqrt(gain), mean, width * gain * variance + mean * mean, log_radius))
-        before = strength
+    least = k / (stretch * stretch) * math.exp(2.0 * (low - shift))
+    widening, growth = math.exp(2.0 * step * (start + start + step)), math.exp(4.0 * step * step)
+    best = math.inf
     whole = first = second = logs = log_squares = part = parts = 0.0
-    for unlikely, density, mean, square, log_radius in found:
-        weight = density * math.exp(0.5 * (best - unlikely))
-        whole += weight
-        first += weight * mean
-        second += weight * square
-        logs += weight * log_radius
-        log_squares += weight * log_radius * log_radius
-        weight /= tolerated + square
-        part += weight
-        parts += weight * mean
+    # a mixture of normal distributions about the nodes, as wide as these are apart. The first round looks for the
+    # likeliest, the second weighs; compiled, working a node out again is quicker than a list of them
+    for weighing in (False, True):
+        z, power, ratio = start, least, widening
+        c = z * z
+        before = strength = power * _disc_share(c)
+        for number in range(_LAST_NODE + 1):
+            node, log_radius, density, after = strength, c - shift, z, strength
+            twice = 1.0 + c + c
+            off, ka = log_radius - _USUAL_RADIUS, math.log(twice / (c * c))
+            ka *= _WEIGHT_KA * ka
+            unlikely = _WEIGHT_RADIUS * off * off + (ka if ka < _MAX_KA_WEIGHT else _MAX_KA_WEIGHT)
+            if number < _LAST_NODE:
+                power *= ratio
+                ratio *= growth
+                z += step
+                c = z * z
+                after = strength = power * _disc_share(c)
+            gap = _NODE_WIDTH * (after - before)
+            before = node
+            width = gap * gap + _MODEL_VARIANCE * node * node
+            off, gain = measured - node, 1.0 / (width + variance)
+            unlikely += off * off * gain
+            if not weighing:
+                best = min(best, unlikely)
+                continue
+            mean = node + width * gain * off
+            square = width * gain * variance + mean * mean
+            # the first is d ln a/dz, but for a factor
+            weight = density * math.sqrt(gain) * math.exp(0.5 * (best - unlikely))
+            whole += weight
+            first += weight * mean
+            second += weight * square
+            logs += weight * log_radius
+            log_squares += weight * log_radius * log_radius
+            weight /= tolerated + square
+            part += weight
+            parts += weight * mean
     share = 1.0 / whole
     strength, mean, square, log_radius = parts / part, first * share, second * share, logs * share
     spread = square - mean * mean
     values = (
         strength,
-        spread + (mean - strength) ** 2,
+        spread + (mean - strength) * (mean - strength),
         min(1.0, spread / variance) if variance > 0.0 else 1.0,
         log_radius,
         math.sqrt(max(0.0, log_squares * share - log_radius * log_radius) + _MODEL_RADIUS * _MODEL_RADIUS),
@@ -195,7 +187,9 @@ class PlaceEstimate(NamedTuple):
             share: variance of its centre over that of one frame.
             motion: covariances of the centre by motion, as ratios of the sides squared.
         """
-        (uu, us, ss), (one_uu, one_us, one_ss), (along, around) = self.fixed, self.one, self.scale
+        uu, us, ss = self.fixed
+        one_uu, one_us, one_ss = self.one
+        along, around = self.scale
         xx, xy, yy = motion
         return (
             uu + share * one_uu + xx * along * along,
@@ -291,11 +285,12 @@ class PlaceEstimator:
         measured = weight * a_xx + rest * a_yy
         unequal = 0.5 * (a_xx - a_yy)
         noise_unequal = 0.25 * (noise_xx + noise_yy - 2.0 * noise_both)
-        per_dipole = (0.5 * slope_x + taper) ** 2 + 0.25 * slope_y * slope_y  # square of the displacement by it
+        tapered = 0.5 * slope_x + taper
+        per_dipole = tapered * tapered + 0.25 * slope_y * slope_y  # square of the displacement by it
         tolerated = noise_place / (per_dipole + 1e-12 * rs * rs)
         dipole = _weigh_dipole(measured, noise, rs, 1.0 / matrix.conductance - robin, stretch, tolerated)
         edge_c = -2.0 * math.pi / rs * robin - math.log(stretch)
-        prior = (_ROUND_INEQUALITY * dipole.strength) ** 2
+        prior = _ROUND_INEQUALITY * _ROUND_INEQUALITY * dipole.strength * dipole.strength
         gain1, gain2 = _gain(unequal, noise_unequal, prior), _gain(a_xy, noise_xy, prior)
         half, cross = gain1 * unequal, gain2 * a_xy
         # where the inequality is real, the weighed mean must not count it twice
@@ -323,29 +318,29 @@ class PlaceEstimator:
             x, y = self._inside(seen_x + move_x, seen_y + move_y)
 
         # derivatives of the place by mean, inequality and cross; what was shrunk counts by its gain
-        by_mean = 0.5 * slope_x + taper, 0.5 * slope_y
-        by_half = rest * slope_x + (4.0 - 2.0 * weight) * taper, -weight * slope_y
-        by_cross = 0.5 * slope_y, 0.5 * slope_x + 3.0 * taper
-        var_mean = dipole.variance
+        by_mean_x, by_mean_y = 0.5 * slope_x + taper, 0.5 * slope_y
+        by_half_x, by_half_y = rest * slope_x + (4.0 - 2.0 * weight) * taper, -weight * slope_y
+        by_cross_x, by_cross_y = 0.5 * slope_y, 0.5 * slope_x + 3.0 * taper
+        var_mean, gain = dipole.variance, dipole.gain
         var_half, var_cross = gain1 * noise_unequal, gain2 * noise_xy
-        gain = dipole.gain
         x_mean = (weight * one.x_along * squares[0] + rest * one.x_around * squares[2]) * length
         y_mean = (weight * one.y_along * squares[0] + rest * one.y_around * squares[2]) * breadth
         x_mean, y_mean = gain * share * x_mean, gain * share * y_mean
         area = abs(dipole.strength) * rs / (2.0 * math.pi)
-        edge, moved = self._edge(x, y), math.hypot(move_x, move_y)
-        neglected = (
-            area * (_NEXT_IMAGE * moved / (edge * edge) + _NEXT_TAPER * math.sqrt(area) * self.curvature**2)
-        ) ** 2
+        edge, moved = min(min(x, length - x), min(y, breadth - y)), math.hypot(move_x, move_y)
+        curved = _NEXT_TAPER * math.sqrt(area) * self.curvature * self.curvature
+        neglected = area * (_NEXT_IMAGE * moved / (edge * edge) + curved)
+        neglected *= neglected
         xx, xy, yy = self._floor.at(x / length, y / breadth, move_x, move_y)
-        xx += by_mean[0] ** 2 * var_mean + by_half[0] ** 2 * var_half + by_cross[0] ** 2 * var_cross
-        xx += 2.0 * by_mean[0] * x_mean + neglected
-        yy += by_mean[1] ** 2 * var_mean + by_half[1] ** 2 * var_half + by_cross[1] ** 2 * var_cross
-        yy += 2.0 * by_mean[1] * y_mean + neglected
-        xy += by_mean[0] * by_mean[1] * var_mean + by_half[0] * by_half[1] * var_half
-        xy += by_cross[0] * by_cross[1] * var_cross + by_mean[1] * x_mean + by_mean[0] * y_mean
+        xx += by_mean_x * by_mean_x * var_mean + by_half_x * by_half_x * var_half + by_cross_x * by_cross_x * var_cross
+        xx += 2.0 * by_mean_x * x_mean + neglected
+        yy += by_mean_y * by_mean_y * var_mean + by_half_y * by_half_y * var_half + by_cross_y * by_cross_y * var_cross
+        yy += 2.0 * by_mean_y * y_mean + neglected
+        xy += by_mean_x * by_mean_y * var_mean + by_half_x * by_half_y * var_half
+        xy += by_cross_x * by_cross_y * var_cross + by_mean_y * x_mean + by_mean_x * y_mean
         if line:
-            along, across = (_UNEVEN_ALONG * reach) ** 2, (_UNEVEN_ACROSS * reach) ** 2
+            square = reach * reach
+            along, across = _UNEVEN_ALONG * _UNEVEN_ALONG * square, _UNEVEN_ACROSS * _UNEVEN_ACROSS * square
             both, differ = 0.5 * (along + across), 0.5 * (along - across) / unlike
             xx, xy, yy = xx + both + differ * half, xy + differ * cross, yy + both - differ * half
         stretch = math.exp(self.curvature * x)
@@ -388,9 +383,6 @@ class PlaceEstimator:
             low_x if x < low_x else high_x if x > high_x else x,
             low_y if y < low_y else high_y if y > high_y else y,
         )
-
-    def _edge(self, x: float, y: float) -> float:
-        return min(x, self.length - x, y, self.breadth - y)
 
 
 def _half_length(dipole: float, beyond: float, ohms: float) -> float:

@@ -94,18 +94,19 @@ class SingleContactTest:
         Returns:
             why there may be more than one contact. Empty once that is excluded.
         """
-        learned, (variance, bias) = self._currents.means[0], self._currents.spread
+        variance, bias = self._currents.spread
+        learned = self._currents.means[0]
         if not learned:
             return _CURRENTS_UNKNOWN
         frames, differ, across, mean, required, widest = self._evidence
         if frames < _PAIR_FRAMES:
             frames += 1
         gain, limit = 1.0 / frames, self._limit
-        (along, cross, around), (upper, lower) = matrix[3:6], self._sheets
-        rise1, rise2 = self._per_along * (along - upper), self._angles * (around - lower)
+        upper, lower = self._sheets
+        rise1, rise2 = self._per_along * (matrix.along - upper), self._angles * (matrix.around - lower)
         total = level / (1.0 - level) * self._pulldown if level < 0.999 else limit
         differ += gain * (rise2 - rise1 - differ)
-        across += gain * (self._per_cross * cross - across)
+        across += gain * (self._per_cross * matrix.cross - across)
         mean += gain * (0.5 * (rise1 + rise2) - mean)
         if disc is not None:
             distance = DANGEROUS_ANGLE * (self._radius1 + self._taper * u)

@@ -39,7 +39,7 @@ class TouchFilter:
     """
 
     def __init__(self, length: tuple[float, float]) -> None:
-        self._length = length
+        self._squares = length[0] * length[0], length[1] * length[1]
         self.restart()
 
     def restart(self) -> None:
@@ -49,10 +49,16 @@ class TouchFilter:
 
     def begin(self, matrix: ContactMatrix) -> None:
         """Begin with a matrix."""
-        self.frames, self.values = 1, matrix[:6]
+        g, x, y, along, cross, around, _, _, _ = matrix
+        self.frames, self.values = 1, (g, x, y, along, cross, around)
         self._centre = matrix.x, matrix.y, 0.0, 0.0  # the first, and how far predictions were off of late
         self._sums = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # of ages^0, ^1, ^2; of x and y, alone and by age
         self._line = 1.0, 1.0, 0.0, 0.0, 0.0, 0.0  # variances now and one frame ahead, steps, chance, what is unsure
+
+    def mean(self) -> ContactMatrix:
+        """Return the values as those of one frame that does not contradict itself."""
+        g, x, y, along, cross, around = self.values
+        return tuple.__new__(ContactMatrix, (g, x, y, along, cross, around, 0.0, 0.0, 0.0))
 
     @property
     def share(self) -> float:
@@ -82,12 +88,13 @@ class TouchFilter:
         if not self.frames:
             self.begin(matrix)
             return
-        new_g, new_x, new_y, new_along, new_cross, new_around = matrix[:6]
+        new_g, new_x, new_y, new_along, new_cross, new_around, _, _, _ = matrix
         g, x, y, along, cross, around = self.values
         usual = _USUAL_SPEED * period
-        usual_x, usual_y = (usual / self._length[0]) ** 2, (usual / self._length[1]) ** 2
+        usual_x, usual_y = usual * usual / self._squares[0], usual * usual / self._squares[1]
         xx, yy = noise.xx, noise.yy
-        (_, ahead, step_x, step_y, moves, unsure), (first_x, first_y, smooth_x, smooth_y) = self._line, self._centre
+        _, ahead, step_x, step_y, moves, unsure = self._line
+        first_x, first_y, smooth_x, smooth_y = self._centre
         moving_x, moving_y = unsure * step_x * step_x, unsure * step_y * step_y
         if self.frames == 1:
             moving_x, moving_y = usual_x, usual_y
@@ -133,7 +140,8 @@ class TouchFilter:
             xx, yy: noise of one frame's centre.
             usual_x, usual_y: variances of the velocity of what moves [sides per frame].
         """
-        (s0, s1, s2, x0, x1, y0, y1), (first_x, first_y, _, _) = self._sums, self._centre
+        s0, s1, s2, x0, x1, y0, y1 = self._sums
+        first_x, first_y, _, _ = self._centre
         share = 1.0 / s0
         lag = -s1 * share  # frames from the mean time of them all
         spread = s2 + s1 * lag

@@ -73,7 +73,8 @@ class TouchPlace:
         self._scale = self._estimator.length * widest / cone.radius1, cone.wrap * widest
         self._seam = SeamCertainty(sensor, settings, self._estimator, self._scale[1])
         supply = parts.supply_volts / parts.adc_volts * parts.full_count
-        self._count_variance = supply * supply / (1.0 + currents.aspect**4)
+        self._mixed = 1.0 + currents.aspect**4
+        self._count_variance = supply * supply / self._mixed
         self._filter = TouchFilter(self._scale)
         self._sheet_drift = sensor.tolerance.drift**2
         self._noise: MatrixNoise | None = None
@@ -136,8 +137,9 @@ class TouchPlace:
         if noise is None:
             self._noise = noise = self._noise_of(matrix, frame, period)
         track.feed(matrix, noise, period)
-        frames, (whole, x, y) = track.frames, track.values[:3]
-        estimate, (rest, due, solved) = self._estimate, self._due
+        frames, estimate = track.frames, self._estimate
+        whole, x, y, _, _, _ = track.values
+        rest, due, solved = self._due
         rest, due = rest - 1, 1.0 if frames == 1 else due
         self._due = rest, due, solved
         steady = abs(whole - solved) < _SOLVE_STEP * solved
@@ -160,14 +162,14 @@ class TouchPlace:
                 *(now, level, seam.u, seam.phi, not doubt, doubt, frame.clock_us, frame.sequence),
                 *(seam.covariance, None, None, seam.elongation, velocity),
             )
-        if not doubt and covariance[2] > self._loosest * (self._radius1 + self._taper * u) ** 2:
+        wide = self._radius1 + self._taper * u
+        if not doubt and covariance[2] > self._loosest * wide * wide:
             doubt = _UNKNOWN_NORMAL
         self._located = self._located or not doubt
-        values = (
-            *(now, level, u, phi, not doubt, doubt, frame.clock_us, frame.sequence),
-            *(covariance if steady else None, *(estimate.radius() if steady else (None, None))),
-            *(estimate.line if doubt else None, velocity),
-        )
+        told, line = covariance if steady else None, estimate.line if doubt else None
+        radius, deviation = estimate.radius() if steady else (None, None)
+        number, clock = frame.sequence, frame.clock_us
+        values = now, level, u, phi, not doubt, doubt, clock, number, told, radius, deviation, line, velocity
         return tuple.__new__(TouchReading, values)  # quicker than TouchReading()
 
     def _placed(self, x: float, y: float, estimate: PlaceEstimate | None) -> tuple[float, float]:
@@ -189,7 +191,7 @@ class TouchPlace:
         self._estimate: PlaceEstimate | None = None
 
     def _solve(self, frame: Frame, now: float, period: float) -> PlaceEstimate:
-        mean, frames = ContactMatrix(*self._filter.values, 0.0, 0.0, 0.0), self._filter.frames
+        mean, frames = self._filter.mean(), self._filter.frames
         noise = self._noise
         if frames == 1 or noise is None:
             self._noise = noise = self._noise_of(mean, frame, period)
@@ -210,14 +212,16 @@ class TouchPlace:
 
     def _sheets(self, now: float) -> SheetConductances:
         """Return the sheets as they were learned. While a touch lasts they may drift unseen."""
-        (frames, radial, angular), (variance, bias) = self._currents.means, self._currents.spread
+        frames, radial, angular = self._currents.means
+        variance, bias = self._currents.spread
         upper, lower = self._currents.sheets()
-        if not frames:
-            return SheetConductances(upper, lower, (_UNLEARNED_ERROR * upper) ** 2, (_UNLEARNED_ERROR * lower) ** 2)
-        one = variance / (1.0 + self._currents.aspect**4) / frames + bias**2
-        ratio = one / radial**2, one / angular**2
-        drift = (self._drift * (now - self._began)) ** 2 + self._sheet_drift
-        return SheetConductances(upper, lower, upper * upper * (ratio[0] + drift), lower * lower * (ratio[1] + drift))
+        drift = self._drift * (now - self._began)
+        drift = drift * drift + self._sheet_drift
+        error1 = error2 = _UNLEARNED_ERROR * _UNLEARNED_ERROR
+        if frames:
+            one = variance / self._mixed / frames + bias * bias
+            error1, error2 = one / (radial * radial) + drift, one / (angular * angular) + drift
+        return tuple.__new__(SheetConductances, (upper, lower, upper * upper * error1, lower * lower * error2))
 
     def _mapped(self, estimate: PlaceEstimate) -> PlaceEstimate:
         """Carry the covariance through the calibration's map."""
@@ -269,6 +273,5 @@ class TouchPlace:
         if noise is None or self.altered or not self._seam.may_be(mean.values):
             self._seam.interrupt()
             return None
-        whole = ContactMatrix(*mean.values, 0.0, 0.0, 0.0)
         frames, sheets = float(mean.frames), self._sheets(now)
-        return self._seam.feed(whole, noise, frames, sheets, matrix.conductance, reading.location_valid)
+        return self._seam.feed(mean.mean(), noise, frames, sheets, matrix.conductance, reading.location_valid)

@@ -56,18 +56,18 @@ def decode_blocks(data: bytes) -> list[Block]:
     Raises:
         RecordingError: a block is longer than any can be, or is not all there.
     """
-    at, size = 0, len(data)
-    unpack, skip, make = _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size, tuple.__new__
+    at, size, unpack, skip = 0, len(data), _BLOCK_HEAD.unpack_from, _BLOCK_HEAD.size
     blocks: list[Block] = []
-    put, longest = blocks.append, MAX_PAYLOAD
+    head: tuple[int, int, float]
     try:
         while at < size:
-            length, kind, time = unpack(data, at)
+            head = unpack(data, at)
+            length, kind, time = head
             start = at + skip
             at = start + length
-            if at > size or length > longest:
+            if at > size or length > MAX_PAYLOAD:
                 raise RecordingError(f"a block has {length} bytes")
-            put(make(Block, (kind, time, data[start:at])))  # half the time of Block(...)
+            blocks.append(tuple.__new__(Block, (kind, time, data[start:at])))  # half the time of Block(...)
     except struct.error:
         raise RecordingError(f"{size - at} bytes are left behind its last block") from None
     return blocks

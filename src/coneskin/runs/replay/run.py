@@ -180,6 +180,10 @@ class Run:
         return min(lost, default=math.inf)
 
     @property
+    def _whole_until(self) -> float:
+        return math.nextafter(self.gap, -math.inf)
+
+    @property
     def events(self) -> list[GuardEvent]:
         """Events of the run, as they were recorded."""
         return [decode_event(block) for block in self.select(kinds=frozenset({BlockKind.EVENT}))]
@@ -202,10 +206,13 @@ class Run:
         progress: Progress = silent,
     ) -> Iterator[Block]:
         """Yield blocks of kinds, from and until a time [s, host clock]; the rest is not read, as far as it can be."""
+        for blocks in self._batches(since, until, kinds, progress):
+            yield from blocks
+
+    def _batches(self, since: float, until: float, kinds: frozenset[int], progress: Progress) -> Iterator[list[Block]]:
+        """Yield the blocks of ``select``, many at a time: quicker than one by one."""
         if not isinstance(self.blocks, Recording):
-            for block in self.blocks:
-                if since <= block.time <= until and block.kind in kinds:
-                    yield block
+            yield [block for block in self.blocks if since <= block.time <= until and block.kind in kinds]
             return
         begin = self.blocks.since
         duration = max(self.blocks.until - begin, _PROGRESS_PERIOD)
@@ -215,7 +222,7 @@ class Run:
             if time >= due:
                 due = time + _PROGRESS_PERIOD
                 progress(min((time - begin) / duration, 1.0))
-            yield from blocks
+            yield blocks
         progress(1.0)
 
     def frames(self, progress: Progress = silent) -> Iterator[tuple[float, Frame]]:
@@ -331,12 +338,11 @@ class Run:
         Yields:
             each input and what the guard puts out for it; the list is used again.
         """
-        gap, outputs = self.gap, list[Output]()
-        for block in self.select(kinds=INPUTS, progress=progress):
-            if block.time < gap:
-                core.feed(block, outputs)
-                yield block, outputs
-                outputs.clear()
+        outputs = list[Output]()
+        for block in self.select(until=self._whole_until, kinds=INPUTS, progress=progress):
+            core.feed(block, outputs)
+            yield block, outputs
+            outputs.clear()
 
     def touches(self) -> list[_FoundTouch]:
         """Return the touches in what is left of the run, in the order of their beginnings.
@@ -376,12 +382,14 @@ class Run:
             RecordingError: a block holds what no guard records.
         """
         events: list[GuardEvent] = []
-        frames, skin = 0, int(BlockKind.SKIN)
-        for block, outputs in self.decide(self.build_core(scene), progress):
-            if outputs:
-                events += [output for output in outputs if isinstance(output, GuardEvent)]
-            if block.kind == skin:
-                frames += len(block.payload)
+        outputs = list[Output]()
+        core, frames, skin = self.build_core(scene), 0, int(BlockKind.SKIN)
+        for blocks in self._batches(-math.inf, self._whole_until, INPUTS, progress):
+            for block in blocks:
+                core.feed(block, outputs)
+            events += [output for output in outputs if isinstance(output, GuardEvent)]
+            outputs.clear()
+            frames += sum(len(payload) for kind, _, payload in blocks if kind == skin)
         gap, recorded = self.gap, self.events
         then = [event for event in recorded if event.name not in SESSION_EVENTS and event.time < gap]
         # an input is recorded before its events, so a run that was cut off may lack the last of these
