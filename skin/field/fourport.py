@@ -22,8 +22,6 @@ import numpy as np
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import FieldError
 
-from .sheet import SectorSheet
-
 if TYPE_CHECKING:
     Numbers = float | Floats
 
@@ -32,7 +30,7 @@ if TYPE_CHECKING:
 _DIFFERENCE_MATRIX = np.array([[0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)  # not frozen: to make one takes a third of the time
 class Coupling:
     """The effect of the contacts between the sheets, one entry for each scene.
 
@@ -88,7 +86,7 @@ class Coupling:
         return w
 
 
-def admittance(coupling: Coupling, sheet: SectorSheet, upper_resistance: float, lower_resistance: float) -> Floats:
+def admittance(coupling: Coupling, upper: float, lower: float) -> Floats:
     """Compute Y of the 4-port, I = Y V, currents into the sensor at (A, B, C, D) [S], shape (n, 4, 4).
 
     Symmetric exactly; rows sum to zero to rounding of their entries. Where contacts are so weak that they vanish
@@ -96,8 +94,6 @@ def admittance(coupling: Coupling, sheet: SectorSheet, upper_resistance: float, 
     """
     y = _DIFFERENCE_MATRIX.T @ coupling.matrix() @ _DIFFERENCE_MATRIX
     y = 0.5 * (y + y.transpose(0, 2, 1))
-    upper = sheet.breadth / (upper_resistance * sheet.length)
-    lower = sheet.length / (lower_resistance * sheet.breadth)
     y[:, :2, :2] += upper * np.array([[1.0, -1.0], [-1.0, 1.0]])
     y[:, 2:, 2:] += lower * np.array([[1.0, -1.0], [-1.0, 1.0]])
     return np.asarray(y, dtype=np.float64)
@@ -169,7 +165,7 @@ def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0,
     return DrivePhase("angular", guide, guide, Terminal(supply, source, lead), Terminal(0.0, source, lead))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Readings:
     """The answer of one phase; axes over electrodes run A, B, C, D.
 
@@ -191,34 +187,35 @@ class Readings:
         return int(self.contact.shape[0])
 
 
-def solve_phase(
-    coupling: Coupling, sheet: SectorSheet, upper_resistance: float, lower_resistance: float, phase: DrivePhase
-) -> Readings:
+def solve_phase(coupling: Coupling, upper: float, lower: float, phase: DrivePhase) -> Readings:
     """Compute the potentials and currents of one phase.
+
+    Args:
+        coupling: of the sheets.
+        upper: conductance of the upper sheet without contacts, between its electrodes [S].
+        lower: of the lower one [S].
+        phase: what is applied.
 
     Raises:
         FieldError: a sheet is connected to nothing: no contact and both its electrodes open.
     """
-    upper = sheet.breadth / (upper_resistance * sheet.length)
-    lower = sheet.length / (lower_resistance * sheet.breadth)
     numbers = coupling.numbers()
     g, x, y, xx, xy, yy = numbers
     a, b, c, d = terminals = phase.terminals
-    opens = [t.resistance == math.inf for t in terminals]
+    opens = [a.resistance == math.inf, b.resistance == math.inf, c.resistance == math.inf, d.resistance == math.inf]
     if (opens[0] and opens[1]) and (opens[2] and opens[3]):
         raise FieldError(f"phase {phase.name}: all four electrodes are open; drive at least one sheet")
-    for pair, first in (("A and B", 0), ("C and D", 2)):
-        if opens[first] and opens[first + 1] and not (g > 0.0 if isinstance(g, float) else (g > 0.0).all()):
-            raise FieldError(
-                f"phase {phase.name}: without contact nothing fixes the potential of {pair}, which are open;"
-                " give their terminals a resistance, as every ADC has"
-            )
-    ideal = [t.resistance == 0.0 == t.lead for t in terminals]
+    pair = "A and B" if opens[0] and opens[1] else "C and D" if opens[2] and opens[3] else ""
+    if pair and not (g > 0.0 if isinstance(g, float) else (g > 0.0).all()):
+        raise FieldError(
+            f"phase {phase.name}: without contact nothing fixes the potential of {pair}, which are open;"
+            " give their terminals a resistance, as every ADC has"
+        )
     volts: tuple[Numbers, ...]
     contact = None
-    if ideal == [True, True, False, False] and opens == [False, False, True, True]:
+    if pair == "C and D" and a.resistance == a.lead == b.resistance == b.lead == 0.0:
         volts = a.emf, b.emf, *_guides(x, y, xy / (lower + yy), b.emf, a.emf)
-    elif ideal == [False, False, True, True] and opens == [True, True, False, False]:
+    elif pair == "A and B" and c.resistance == c.lead == d.resistance == d.lead == 0.0:
         volts = *_guides(y, x, xy / (upper + xx), d.emf, c.emf), c.emf, d.emf
     else:
         solved, contact = _general(coupling, upper, lower, phase)

@@ -49,6 +49,7 @@ class FieldModel:
     lower_resistance: float
     tolerance: float = 1e-12
     _scenes: SceneSolver = field(init=False, repr=False, compare=False)
+    _bare: tuple[float, float] = field(init=False, repr=False, compare=False)  # conductances without contacts [S]
 
     def __post_init__(self) -> None:
         for name in ("upper_resistance", "lower_resistance"):
@@ -59,6 +60,9 @@ class FieldModel:
             raise FieldError(f"tolerance must be in [1e-15, 0.1] of the supply, got {self.tolerance!r}")
         given = self.sheet, self.upper_resistance, self.lower_resistance, self.tolerance
         object.__setattr__(self, "_scenes", scene_solver(*given))
+        length, breadth = self.sheet.length, self.sheet.breadth
+        bare = breadth / (self.upper_resistance * length), length / (self.lower_resistance * breadth)
+        object.__setattr__(self, "_bare", bare)
 
     @property
     def contrast(self) -> float:
@@ -112,7 +116,7 @@ class FieldModel:
 
     def admittance(self, coupling: Coupling) -> Floats:
         """Compute Y of the 4-port (A, B, C, D) [S], shape (n, 4, 4)."""
-        return admittance(coupling, self.sheet, self.upper_resistance, self.lower_resistance)
+        return admittance(coupling, *self._bare)
 
     def read(self, coupling: Coupling, phase: DrivePhase) -> Readings:
         """Compute the potentials and currents of one phase.
@@ -120,7 +124,7 @@ class FieldModel:
         Raises:
             FieldError: a sheet without contact whose electrodes are both open.
         """
-        return solve_phase(coupling, self.sheet, self.upper_resistance, self.lower_resistance, phase)
+        return solve_phase(coupling, *self._bare, phase)
 
     def _in_groups(self, discs: Discs, order: int | None) -> Coupling:
         """Solve scenes of one resolution together; raise the order of those whose multipoles have not died away."""
