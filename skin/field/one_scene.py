@@ -36,6 +36,7 @@ _REFLECTION_POWER = 4.0
 _MIN_RATE = 0.2  # slower than that, the order would be too high
 _SAFETY_FACTOR = 4.0  # on the rest of a geometric series
 _MIN_IMAGE = 0.25  # share of the strip's length that images in both ends must be away
+_MAX_DENSE_ORDER = 8  # measured: above, two smaller products take less time than one
 _MIN_TERM = 1e-3  # of the tolerance: size of an image that no longer counts
 
 
@@ -53,9 +54,9 @@ def _rim_powers(order: int) -> tuple[Floats, Floats]:
 
 
 @cache
-def _log_series(order: int) -> tuple[Complex, Floats]:
+def _log_series(order: int) -> tuple[Floats, Floats]:
     """Return f_0..f_n of L = log(1 - exp(-z)) by L and powers of 1/(exp(z) - 1), and of log(sinh(t/2) / (t/2)) at 0."""
-    near = np.zeros((order + 1, order + 1), dtype=np.complex128)
+    near = np.zeros((order + 1, order + 1))
     near[0, 0] = near[1, 1] = 1.0
     k = np.arange(1, order + 1)
     for n in range(2, order + 1):
@@ -70,29 +71,32 @@ def _log_series(order: int) -> tuple[Complex, Floats]:
 
 
 class _Tables(NamedTuple):
-    """What an order M of one model needs, whatever the contacts are; series are f_0..f_2M, Fourier coefficient 0 last.
+    """What k discs at an order M in one model need, wherever they are; Fourier coefficient 0 last.
 
     Attributes:
-        turns: by the strip's direction (1, -1, i or -i times x + i y): T without r^m, and H of a disc on itself.
-        index: j + k.
-        kernel: what the series at w + w', w + w'*, w - w'* and w - w' are multiplied by in H, shape (4, M+1, M+1).
-        linear: H from offset to offset, the same for w' and w'*.
-        near: series by the logarithm, and by powers of 1/(exp(z) - 1).
-        images: series by exp(n z), n of the `_waves`.
-        slopes: of offset along and, times i, around [sides of the sheet], (-1)^(m-1) / m, shape (2, M).
+        series: f_0..f_2M of log, f_1, a disc on itself, powers of 1/(exp(z) - 1), and exp(n z), n of the `_waves`.
+        mix: of the series (at w + w' and w - w' conjugate, at w + w'* and w - w'* not) to H_jk of k even and odd, and
+            there to the rows of the real and of the imaginary parts; shape (2M+1, 4, kinds).
+        spread: from these, k even before k odd, to the Fourier coefficients m, n; without powers of r.
+        dense: both at once; None where the order is so high that this takes longer.
+        linear: what offset times offset adds, shape (M+1, 2, M+1, 1).
+        grid: the matrix without its blocks: below them what x/L and y/T are on the rims.
+        lift: what the scaled diagonal lacks; at the charges so much that only what is left of their rows is read.
+        kept: rows of the charges, of x/L and of y/T.
     """
 
-    turns: dict[Any, tuple[Complex, Complex]]  # complex, which mypyc does not find here
-    index: Any
-    kernel: Complex
+    series: Complex
+    mix: Complex
+    spread: Floats
+    dense: Complex | None
     linear: Complex
-    near: Complex
-    images: Complex
-    slopes: Complex
+    grid: Complex
+    lift: Floats
+    kept: Any
 
 
 class _Place(NamedTuple):
-    """A disc in the strip [(shorter side)/pi]: distances from ends and edges, r, and the largest |delta|."""
+    """A disc in the strip [(shorter side)/pi]: distances from ends and edges, r, the largest |delta|; and ka."""
 
     x: float
     y: float
@@ -102,17 +106,7 @@ class _Place(NamedTuple):
     p_far: float
     radius: float
     reach: float
-
-
-class _Pair(NamedTuple):
-    """Two discs, or one and itself, seen from the nearer end; the first lies at least as far from it as the second."""
-
-    first: int
-    second: int
-    turn: Any
-    high_far: float
-    low: float
-    constant: float
+    ka: float
 
 
 class SceneSolver:
@@ -126,47 +120,60 @@ class SceneSolver:
         along, across = (upper, lower) if strip.along_x else (lower, upper)
         self._linear = along / self._total / (math.pi * self._sigma)
         self._odd = (across - along) / self._total
+        self._log_odd = math.log(abs(self._odd)) if self._odd else -math.inf
+        self._bend = sheet.curvature / (2.0 * strip.scale) * self._turn
         aspect = sheet.length / sheet.breadth
         self._units = tuple(r / self._total for r in (upper * aspect, math.sqrt(upper * lower), lower / aspect))
         self._digits = math.log(1.0 / (_MIN_TERM * self._tolerance))
         count = math.ceil(self._digits / (_MIN_IMAGE * self._sigma))
-        self._waves = np.arange(1.0, count + 1.0).repeat(2) * np.tile((1.0 + 0j, -1.0), count)
-        self._tables: dict[int, _Tables] = {}
+        self._waves = np.arange(1.0, count + 1.0).repeat(2) * np.tile((1.0, -1.0), count)
+        self._tables: dict[tuple[int, int], _Tables] = {}
         self._factorise: Any = None  # with the first table: a guard that solves nothing does not wait for scipy
 
-    def _of_order(self, order: int) -> _Tables:
+    def _of_order(self, order: int, k: int) -> _Tables:
         from scipy.linalg.lapack import dpotrf
 
         self._factorise = dpotrf
         rim, binomials = _rim_powers(order)
         near, own = _log_series(2 * order)
         j, n = np.arange(order + 1), np.arange(2 * order + 1)
-        size = np.abs(self._waves)[:, None]
-        factorials = np.array([float(math.factorial(m)) for m in n.tolist()])
-        images = -(self._waves.real[:, None] ** n) / (
-            size * np.expm1(np.minimum(2.0 * self._sigma * size, 600.0)) * factorials
-        )
-        signed = binomials * (-1.0) ** j
-        kernel = np.array([binomials, -self._odd * binomials, self._odd * signed, -signed]) / (2.0 * math.pi)
-        linear = np.zeros_like(binomials)
-        linear[1, 1] = -0.5 * self._linear
-        index, turns = j[:, None] + j, {}
+        turn, curvature, size = self._turn, self._sheet.curvature / self._scale, np.abs(self._waves)
+        factorials = np.array([float(math.factorial(m)) for m in n.tolist()])[:, None]
+        size *= np.expm1(np.minimum(2.0 * self._sigma * size, 600.0))
+        images = -(self._waves ** n[:, None]) / (size * factorials)
+        own = own * (1.0 - (curvature / turn) ** n).real - 0.5 * (n == 1)
+        series = np.column_stack([near[0], n == 1, own, near[1:].T, images]) * turn.conjugate() ** n[:, None]
         # b is everywhere the same multiple of r, so b^(m-j) r^j is a power of it times r^m
-        rim = rim * (self._sheet.curvature / self._scale) ** np.maximum(np.array([*j[1:], 0.0]) - j[:, None], 0.0)
-        for turn in (self._turn, -self._turn):
-            eta = self._sheet.curvature / (self._scale * turn)
-            series = own * (1.0 - eta**n) + images.sum(axis=0)
-            series[1] = -0.5
-            itself = kernel[3] * series[index] + linear
-            itself[0, 1] += eta / (4.0 * math.pi)
-            itself[1, 0] += eta / (4.0 * math.pi)
-            turns[turn] = rim * turn ** j[:, None], itself
-        # Complex, what meets complex numbers: numpy takes as long to convert a small array as to multiply it.
-        slopes = rim[1, :-1] / self._scale * np.array([[1.0 / self._sides[0]], [1j / self._sides[1]]])
-        return _Tables(turns, index, *(a.astype(np.complex128) for a in (kernel, linear, near, images, slopes)))
+        rim = rim * curvature ** np.maximum(np.array([*j[1:], 0.0]) - j[:, None], 0.0)
+        spread = np.zeros((order + 1, order + 1, 2, n.size))
+        for column in j.tolist():
+            ends = rim * binomials[:, column : column + 1]
+            spread[:, :, column % 2, column : column + order + 1] += ends.T[:, None] * rim[column, :, None]
+        square = (turn * turn).real
+        each = np.empty((2, 2, n.size, 4), dtype=np.complex128)
+        parts = np.array([[1.0], [1j]], dtype=np.complex128)
+        each[..., 0], each[0, ..., 1], each[1, ..., 1] = parts.conj(), -parts.conj(), parts.conj()
+        crossed = -self._odd * square**n * parts
+        each[0, ..., 2], each[0, ..., 3] = crossed, -crossed
+        each[1, ..., 2:] = square * crossed[..., None]
+        each = each[..., : 4 if self._odd else 2] / (2.0 * math.pi)
+        mix, dense = each.transpose(2, 0, 1, 3).reshape(n.size, 4, -1), None
+        if order <= _MAX_DENSE_ORDER:
+            even, odd = (spread[:, None, :, parity, :, None] * each[parity, :, None] for parity in (0, 1))
+            dense = (even + odd).reshape(2 * rim.size, -1)
+        linear = np.outer(rim[1], rim[1])[:, :, None] * (parts + square * parts.conj())[:, 0] * (-0.5 * self._linear)
+        first = 2 * k * order  # row of the first charge
+        size = first + 2 * k
+        grid = np.zeros((size + 2, size // 2 + 1), dtype=np.complex128)
+        slopes = rim[1, :-1].repeat(k) / self._scale
+        grid[size:, : first // 2] = slopes / self._sides[0], 1j * slopes / self._sides[1]
+        lift = np.array([*[1.0] * first, *[1e30] * (size + 2 - first)])
+        kept = np.array([*range(first, size, 2), size, size + 1])
+        linear = linear.swapaxes(1, 2)[..., None]
+        return _Tables(series, mix, spread.reshape(rim.size, -1), dense, linear, grid, lift, kept)
 
     def _place(
-        self, u: float, phi: float, radius: float, answer: float, rates: list[tuple[float, float]]
+        self, u: float, phi: float, radius: float, ka: float, answer: float, rates: list[tuple[float, float]]
     ) -> _Place | None:
         """Return where a disc is, and add to the `_rates`; None unless it lies within the sheet and off its edges."""
         sheet, scale = self._sheet, self._scale
@@ -187,13 +194,13 @@ class SceneSolver:
         reach = r
         if bend:
             reach *= -math.log1p(-abs(bend)) / abs(bend)
-            rates.append((1.0, -2.0 * math.log(abs(bend))))
-        rates += _rates(1.0, answer, min(math.hypot(end, side) / radius, math.pi / r))
+            rates.append((0.0, -2.0 * math.log(abs(bend))))
+        rates += _rates(0.0, answer, min(math.hypot(end, side) / radius, math.pi / r))
         if self._odd:
-            rates += _rates(abs(self._odd), answer, min(end, side) / radius)
+            rates += _rates(self._log_odd, answer, min(end, side) / radius)
         at = scale * x, scale * x_far, scale * y, scale * y_far
         s, s_far, p, p_far = at if self._turn == 1.0 else at[2:] + at[:2]
-        return _Place(x, y, s, s_far, p, p_far, r, reach)
+        return _Place(x, y, s, s_far, p, p_far, r, reach, ka)
 
     def _gap(self, one: _Place, other: _Place, here: float, there: float, rates: list[tuple[float, float]]) -> None:
         """Add to the `_rates` what two discs with these answers do to each other; a rate of 0 where they overlap."""
@@ -209,10 +216,10 @@ class SceneSolver:
         a, b = one.radius, other.radius * math.exp(kappa * (other.x - one.x))
         apart = abs(w) * self._scale
         if not apart > a + b:
-            rates.append((1.0, 0.0))
+            rates.append((0.0, 0.0))
             return
         rates += [(here, 2.0 * math.log(apart / a)), (there, 2.0 * math.log(apart / b))]
-        rates.append(((here * there) ** 2, math.acosh((apart * apart - a * a - b * b) / (2.0 * a * b))))
+        rates.append((2.0 * (here + there), math.acosh((apart * apart - a * a - b * b) / (2.0 * a * b))))
 
     def solve(self, discs: Sequence[tuple[float, float, float, float]]) -> Coupling | None:
         """Solve one scene.
@@ -230,14 +237,16 @@ class SceneSolver:
             if not (radius > 0.0 and conductance >= 0.0):
                 return None
             ka = math.sqrt(conductance * self._total) * radius
-            answer = 1.0 if ka > 1e6 else (ka / (_TYPICAL_ORDER + math.hypot(_TYPICAL_ORDER, ka))) ** 2
-            place = self._place(u, phi, radius, answer, rates)
+            most = min(ka, 1e6)
+            answer = 2.0 * math.log(most / (_TYPICAL_ORDER + math.hypot(_TYPICAL_ORDER, most))) if ka else -math.inf
+            place = self._place(u, phi, radius, ka, answer, rates)
             if place is None:
                 return None
             answers.append(answer)
             places.append(place)
-        pairs, corners, ends, edges, gaps, points, inverse, logs = [], [], [], [], [], [], [], []
-        least, image, loss = math.inf, math.inf, 1.0
+        corners, gaps, ends, edges, pairs, signs = [], [], [], [], [], []
+        points, inverse, logs, slopes, itself = [], [], [], [], []
+        least, image, loss, linear = math.inf, math.inf, 1.0, math.pi * self._linear
         for i, one in enumerate(places):
             for j, other in enumerate(places[: i + 1]):
                 p, p_far = one.p + other.p, one.p_far + other.p_far
@@ -248,47 +257,52 @@ class SceneSolver:
                 if s < other_s:
                     far, first, second = other.s if flipped else other.s_far, j, i
                     s, other_s, apart = other_s, s, -apart
-                turn = -self._turn if flipped else self._turn
-                if turn.real < 0.0 or turn.imag < 0.0:
+                sign, reach = -1.0 if flipped else 1.0, one.reach + other.reach
+                if flipped == (self._turn == 1.0):
                     apart, both = -apart, -both
-                constant = self._linear * other_s * far
-                reach = one.reach + other.reach
-                corners.append((s + other_s, both, reach))
+                constant, slope = 2.0 * linear * other_s * far, linear * (far - other_s) + 0j
                 if i == j:
-                    constant -= math.log(one.radius) / (2.0 * math.pi)
+                    constant -= math.log(one.radius)
+                    slope += sign * self._bend
                 else:
-                    gaps.append((s - other_s, apart, reach))
                     self._gap(one, other, answers[i], answers[j], rates)
-                pairs.append(_Pair(first, second, turn, far, other_s, constant))
+                corners.append((s + other_s, -both, reach, constant, slope))
+                gaps.append((s - other_s, -apart, reach, 0.0, linear * (far + other_s)))
                 if self._odd:
-                    ends.append((s + other_s, apart, reach))
-                    edges.append((s - other_s, both, reach))
+                    ends.append((s + other_s, apart, reach, 0.0, 0.0))
+                    edges.append((s - other_s, both, reach, 0.0, 0.0))
+                pairs.append((first, second))
+                signs.append(sign)
                 image = min(image, 2.0 * self._sigma - s - other_s - reach)
-        for distance, around, reach in corners + ends + edges + gaps:
+        for distance, around, reach, constant, slope in corners + gaps + ends + edges:
             points.append(complex(distance, around))
-            if distance > _FAR_DISTANCE:
+            slopes.append(slope)
+            alone = distance == 0.0 == around
+            itself.append(float(alone))
+            if alone or distance > _FAR_DISTANCE:
                 inverse.append(0j)
-                logs.append(0.0)
+                logs.append(constant)
                 continue
             grown, sine = math.expm1(distance), math.sin(0.5 * around)
             z = complex(grown - 2.0 * (grown + 1.0) * sine * sine, (grown + 1.0) * math.sin(around))
             size = abs(z)
             inverse.append(1.0 / z)
-            logs.append(math.log(size) - distance)
+            logs.append(math.log(size) - distance + constant)
             least, loss = min(least, size), max(loss, reach / math.log1p(size))
         tolerance, rate = self._tolerance, min([rate for _, rate in rates])
         if rate < _MIN_RATE or image < _MIN_IMAGE * self._sigma:
             return None
         waves = 2 * math.ceil(self._digits / image)
-        order = math.ceil(max(math.log(max(_FIRST_SIZE * part / tolerance, 1.0)) / each for part, each in rates)) or 1
-        arguments = np.array(points), np.array(inverse), np.array(logs), waves
+        beyond = math.log(tolerance / _FIRST_SIZE)
+        order = math.ceil(max([1.0, *((part - beyond) / each for part, each in rates)]))
+        arguments = np.array([logs, slopes, itself, inverse, points])
         while order <= _MAX_ORDER:
             rounding = _ROUNDING_ERROR * loss ** (2 * order) + 10.0 * math.exp(-(waves // 2 + 1) * image)
             if rounding > 0.1 * tolerance or least ** (2 * order) < 1e-250:
                 return None
             # A scene's symmetry may hide the last orders, so the error is never less than what was expected.
-            least_error = max(rounding, *(_FIRST_SIZE * part * math.exp(-each * order) for part, each in rates))
-            coupling = self._of_scene(order, discs, places, pairs, arguments, math.exp(-rate), least_error)
+            least_error = max(rounding, _FIRST_SIZE * math.exp(max([part - each * order for part, each in rates])))
+            coupling = self._of_scene(order, places, pairs, signs, arguments, waves, math.exp(-rate), least_error)
             error = float(coupling.error[0])
             if error <= tolerance:
                 return coupling
@@ -300,96 +314,78 @@ class SceneSolver:
     def _of_scene(
         self,
         order: int,
-        discs: Sequence[tuple[float, float, float, float]],
         places: Sequence[_Place],
-        pairs: Sequence[_Pair],
-        arguments: tuple[Complex, Complex, Floats, int],
+        pairs: Sequence[tuple[int, int]],
+        signs: list[float],
+        points: Complex,
+        waves: int,
         decay: float,
         least_error: float,
     ) -> Coupling:
         """Solve it at one order; the error is not a number where the matrix is not positive."""
-        tables = self._tables.get(order)
+        k, count, (length, breadth) = len(places), len(pairs), self._sides
+        tables = self._tables.get((order, k))
         if tables is None:
-            tables = self._tables[order] = self._of_order(order)
-        turns, index, kernel, linear, near, images, slopes = tables
-        points, inverse, logs, waves = arguments
-        powers_of = np.empty((len(logs), 2 * order + 1), dtype=np.complex128)
-        powers_of[:, 0], powers_of[:, 1:] = logs, inverse[:, None]
-        np.multiply.accumulate(powers_of[:, 1:], 1, out=powers_of[:, 1:])
-        series = powers_of.dot(near)
-        series += np.exp(points[:, None] * self._waves[:waves]).dot(images[:waves])
-        k, (length, breadth) = len(places), self._sides
-        terms, count = series.take(index, 1), len(pairs)
-        same = terms[:count] * kernel[0]
-        mirrored = linear
-        if self._odd:
-            two = terms[count : 3 * count].reshape(2, count, order + 1, order + 1) * kernel[1:3, None]
-            mirrored = two[0] + two[1]
-            mirrored += linear
-        step = 2 * k
+            tables = self._tables[order, k] = self._of_order(order, k)
+        powers = 2 * order + 3
+        parts = np.empty((powers + waves, points.shape[1]), dtype=np.complex128)
+        parts[:3], parts[3:powers] = points[:3], points[3]
+        np.multiply.accumulate(parts[3:powers], 0, out=parts[3:powers])
+        np.exp(self._waves[:waves, None] * points[4], out=parts[powers:])
+        series = tables.series[:, : powers + waves].dot(parts)
+        if -1.0 in signs:
+            odd = series[1::2]
+            np.multiply(odd, signs * (points.shape[1] // count) if 1.0 in signs else -1.0, out=odd)
+        if tables.dense is None:
+            mixed = np.matmul(tables.mix, series.reshape(2 * order + 1, -1, count)).reshape(2 * order + 1, 2, -1)
+            mixed = mixed.swapaxes(0, 1).reshape(4 * order + 2, -1).view(np.float64)
+            blocks = tables.spread.dot(mixed).view(np.complex128).reshape(order + 1, order + 1, 2, count).swapaxes(1, 2)
+        else:
+            blocks = tables.dense.dot(series.reshape(-1, count)).reshape(order + 1, 2, order + 1, count)
+        blocks += tables.linear
+        # Two neighbours of a row are one complex number, of the real parts' unknown and of the imaginary parts'.
+        grid = tables.grid.copy()
+        matrix, step = grid.view(np.float64), 2 * k
         first = order * step  # row of the first charge
         size = first + step
-        # Two neighbours of a row are one complex number, of the real parts' unknown and of the imaginary parts'.
-        grid = np.zeros((size + 2, size // 2 + 1), dtype=np.complex128)
-        blocks = grid[:size, : size // 2].reshape(order + 1, k, 2, order + 1, k)
-        matrix = grid.view(np.float64)
-        reals = matrix[:size, :size].reshape(order + 1, k, 2, order + 1, k, 2)
-        rims, answers = [], []
-        for i, (place, disc) in enumerate(zip(places, discs, strict=True)):
-            ka = math.sqrt(disc[3] * self._total) * disc[2]
-            ratios = _ratios(ka, order + 1)
-            answers.append(1.0 / (2.0 * math.pi * ka * ratios[0]) if ka * ratios[0] > 0.0 else math.inf)
-            rim = []
-            for m in range(order):
-                rim.append(place.radius ** (m + 1) * math.sqrt(2.0 * math.pi * (m + 1) * ratios[m] * ratios[m + 1]))
-            rims.append(np.array([*rim, 1.0], dtype=np.complex128))
-            grid[size:, i : first // 2 : k] = slopes * rims[i][:-1]
-        apart = iter(terms[len(terms) - count + k :] * kernel[3] if k > 1 else ())
-        for n, (one, other, turn, high_far, low, constant) in enumerate(pairs):
-            to_offset, itself = turns[turn]
-            here = there = to_offset * rims[one]
-            if one == other:
-                straight = same[n] + itself
-            else:
-                straight = same[n] + next(apart) + linear
-                there = to_offset * rims[other]
-            straight[0, 0] += constant
-            straight[1, 0] -= self._linear * low
-            straight[0, 1] += self._linear * high_far
-            across = here.T
-            straight = across.dot(straight).dot(there)
-            crossed = across.dot(mirrored[n] if self._odd else linear).dot(there.conj())
-            turned = straight.conj()
-            blocks[:, one, 0, :, other] = crossed + turned
-            blocks[:, one, 1, :, other] = 1j * (crossed - turned)
+        placed = grid[:size, : size // 2].reshape(order + 1, k, 2, order + 1, k)
+        for n, (one, other) in enumerate(pairs):
+            placed[:, one, :, :, other] = blocks[..., n]
             if one != other:
+                reals = matrix[:size, :size].reshape(order + 1, k, 2, order + 1, k, 2)
                 reals[:, other, :, :, one] = reals[:, one, :, :, other].transpose(2, 3, 0, 1)
+        scale, answers = [1.0] * (size + 2), []
+        for i, (_, _, _, _, _, _, radius, _, ka) in enumerate(places):
+            power, ratios = 1.0, _ratios(ka, order + 1)
+            answers.append(1.0 / (2.0 * math.pi * ka * ratios[0]) if ka * ratios[0] > 0.0 else math.inf)
+            for m in range(order):
+                power *= radius
+                row = m * step + 2 * i
+                scale[row] = scale[row + 1] = power * math.sqrt(2.0 * math.pi * (m + 1) * ratios[m] * ratios[m + 1])
+        scales = np.array(scale)
+        matrix *= scales
+        matrix *= scales[:, None]
         charges = matrix[first:size:2, first:size:2].tolist()
         for i, answer in enumerate(answers):
             charges[i][i] += answer
         diagonal = matrix.reshape(-1)[:: size + 3]
-        diagonal[:first] += 1.0
-        diagonal[first:] = 1e30  # only what is left of it is read
+        diagonal += tables.lift
         factor, failed = self._factorise(matrix.T, clean=0, overwrite_a=1)  # the lower triangle of rows
         if failed:
             return Coupling(*np.full((7, 1), math.nan))
-        solved = factor.T[first:, :first]
+        solved = factor.T.take(tables.kept, 0)
         x, y = [place.x / length for place in places], [place.y / breadth for place in places]
         totals = []
         for end in first, first - step, max(first - 2 * step, 0):  # of this order, and of one and two less
             part = solved[:, :end]
             totals.append(_totals(part.dot(part.T).tolist(), charges, x, y))
-        found, one_less, two_less = totals
-        change = _solution_change(found, one_less, self._units)
+        last, one_less, two_less = totals
+        change = _solution_change(last, one_less, self._units)
         earlier = _solution_change(one_less, two_less, self._units)
         ratio = min(max(decay, change / earlier if change < earlier else decay), 0.9)
-        rest = (
-            (_SAFETY_FACTOR if order > 1 else 2.0 * _SAFETY_FACTOR)
-            * max(change, 0.1 * earlier * decay)
-            * ratio
-            / (1.0 - ratio)
-        )
-        g, x_mean, y_mean, xx, xy, yy = found
+        safety = _SAFETY_FACTOR if order > 1 else 2.0 * _SAFETY_FACTOR
+        rest = safety * max(change, 0.1 * earlier * decay) * ratio / (1.0 - ratio)
+        g, x_mean, y_mean, xx, xy, yy = last
         numbers = g / self._total, x_mean, y_mean, xx / self._total, xy / self._total, yy / self._total
         return Coupling(*np.array([*numbers, max(rest, least_error)]).reshape(7, 1))
 
@@ -417,20 +413,20 @@ def scene_solver(sheet: SectorSheet, upper_resistance: float, lower_resistance: 
 
 
 def _rates(strength: float, answer: float, room: float) -> list[tuple[float, float]]:
-    """Return what an image adds to the error of order M as (size, rate) of size exp(-rate M), at most about that.
+    """Return what an image adds to the error of order M as (ln size, rate) of size exp(-rate M), at most about that.
 
     The image's charge acts from twice the `room` (in radii), once; its images of images act from ever nearer by, and
     weaker each time.
 
     Args:
-        strength: of the image.
-        answer: of the disc to a multipole of middling order.
+        strength: of the image, its logarithm.
+        answer: of the disc to a multipole of middling order, its logarithm.
         room: from the centre to the mirror.
     """
-    once = strength**2 * answer
+    once = 2.0 * strength + answer
     return [
         (once, 2.0 * math.log(2.0 * room)),
-        (once * (strength * answer) ** _REFLECTION_POWER, 2.0 * math.acosh(room)),
+        (once + _REFLECTION_POWER * (strength + answer), 2.0 * math.acosh(room)),
     ]
 
 
@@ -438,7 +434,7 @@ def _ratios(x: float, order: int) -> Sequence[float]:
     """Compute `bessel_ratios` of one number."""
     if x > 100.0:
         return [1.0] * order if math.isinf(x) else bessel_ratios(x, order).tolist()
-    start = order + 7 + math.isqrt(int(40.0 * x))
+    start = order + 4 + math.isqrt(int(25.0 * x))
     rho = x / (start - 0.5 + math.hypot(start + 0.5, x))
     found = [0.0] * order
     for m in range(start - 1, order, -1):
@@ -454,36 +450,39 @@ def _totals(
     """Eliminate the discs' total currents; return G, X, Y and the rest in units of Ru + Rl.
 
     Args:
-        gram: of what the higher moments answer: to the charge of each disc (every second row), to x, to y.
+        gram: of what the higher moments answer: to the charge of each disc, to x, to y.
         charges: what one total current does to another's disc.
         x: centres of the discs along the slant, as a fraction.
         y: the same, around.
     """
     k = len(x)
     if k == 1:
-        pivot = charges[0][0] - gram[0][0]
-        return 1.0 / pivot, x[0] - gram[0][2], y[0] - gram[0][3], gram[2][2], gram[2][3], gram[3][3]
+        (charge, along, around), (_, xx, xy), (_, _, yy) = gram
+        pivot = charges[0][0] - charge
+        return 1.0 / pivot, x[0] - along, y[0] - around, xx, xy, yy
     x0, y0 = sum(x) / k, sum(y) / k
-    rows = []
-    for i, row in enumerate(charges):
-        less = gram[2 * i]
-        rows.append([c - a for c, a in zip(row, less[: 2 * k : 2], strict=True)])
-        rows[i] += 1.0, x[i] - x0 - less[-2], y[i] - y0 - less[-1]
     g = gx = gy = 0.0
-    xx, xy, yy = gram[-2][-2], gram[-2][-1], gram[-1][-1]
-    for i, row in enumerate(rows):
-        pivot = row[i]
-        for below in rows[i + 1 :]:
-            factor = below[i] / pivot
-            for j in range(i + 1, k + 3):
-                below[j] -= factor * row[j]
-        one, along, around = row[k:]
-        g += one * one / pivot
-        gx += one * along / pivot
-        gy += one * around / pivot
-        xx += along * along / pivot
-        xy += along * around / pivot
-        yy += around * around / pivot
+    xx, xy, yy = gram[k][k], gram[k][k + 1], gram[k + 1][k + 1]
+    done: list[tuple[list[float], float, float, float]] = []
+    for i in range(k):
+        less = gram[i]
+        row = [c - a for c, a in zip(charges[i], less, strict=False)]
+        one, along, around = 1.0, x[i] - x0 - less[k], y[i] - y0 - less[k + 1]
+        for j, (above, one2, along2, around2) in enumerate(done):
+            factor = row[j] / above[j]
+            for n in range(j + 1, i + 1):
+                row[n] -= factor * (done[n][0][j] if n < i else row[j])
+            one -= factor * one2
+            along -= factor * along2
+            around -= factor * around2
+        done.append((row, one, along, around))
+        to_one, to_along = one / row[i], along / row[i]
+        g += one * to_one
+        gx += along * to_one
+        gy += around * to_one
+        xx += along * to_along
+        xy += around * to_along
+        yy += around * around / row[i]
     if g <= 0.0:
         return 0.0, x0, y0, xx, xy, yy
     dx, dy = gx / g, gy / g
