@@ -79,7 +79,7 @@ class _Tables(NamedTuple):
             there to the rows of the real and of the imaginary parts; shape (2M+1, 4, kinds).
         spread: from these, k even before k odd, to the Fourier coefficients m, n; without powers of r.
         dense: both at once; None where the order is so high that this takes longer.
-        linear: what offset times offset adds, shape (M+1, 2, M+1, 1).
+        linear: what offset times offset adds to the blocks, or to H_11 half where they are not at once.
         grid: the matrix without its blocks: below them what x/L and y/T are on the rims.
         lift: what the scaled diagonal lacks; at the charges so much that only what is left of their rows is read.
         kept: rows of the charges, of x/L and of y/T.
@@ -149,9 +149,8 @@ class SceneSolver:
         for column in j.tolist():
             ends = rim * binomials[:, column : column + 1]
             spread[:, :, column % 2, column : column + order + 1] += ends.T[:, None] * rim[column, :, None]
-        square = (turn * turn).real
         each = np.empty((2, 2, n.size, 4), dtype=np.complex128)
-        parts = np.array([[1.0], [1j]], dtype=np.complex128)
+        square, parts = (turn * turn).real, np.array([[1.0], [1j]], dtype=np.complex128)
         each[..., 0], each[0, ..., 1], each[1, ..., 1] = parts.conj(), -parts.conj(), parts.conj()
         crossed = -self._odd * square**n * parts
         each[0, ..., 2], each[0, ..., 3] = crossed, -crossed
@@ -161,15 +160,15 @@ class SceneSolver:
         if order <= _MAX_DENSE_ORDER:
             even, odd = (spread[:, None, :, parity, :, None] * each[parity, :, None] for parity in (0, 1))
             dense = (even + odd).reshape(2 * rim.size, -1)
-        linear = np.outer(rim[1], rim[1])[:, :, None] * (parts + square * parts.conj())[:, 0] * (-0.5 * self._linear)
-        first = 2 * k * order  # row of the first charge
-        size = first + 2 * k
+        offset = (parts + square * parts.conj()) * (-0.25 * self._linear)
+        linear = np.outer(rim[1], rim[1])[:, :, None] * (2.0 * offset[:, 0])
+        first, size = 2 * k * order, 2 * k * (order + 1)  # row of the first charge, and rows without x/L and y/T
         grid = np.zeros((size + 2, size // 2 + 1), dtype=np.complex128)
         slopes = rim[1, :-1].repeat(k) / self._scale
         grid[size:, : first // 2] = slopes / self._sides[0], 1j * slopes / self._sides[1]
         lift = np.array([*[1.0] * first, *[1e30] * (size + 2 - first)])
         kept = np.array([*range(first, size, 2), size, size + 1])
-        linear = linear.swapaxes(1, 2)[..., None]
+        linear = linear.swapaxes(1, 2)[..., None] if dense is not None else offset
         return _Tables(series, mix, spread.reshape(rim.size, -1), dense, linear, grid, lift, kept)
 
     def _place(
@@ -337,17 +336,18 @@ class SceneSolver:
             odd = series[1::2]
             np.multiply(odd, signs * (points.shape[1] // count) if 1.0 in signs else -1.0, out=odd)
         if tables.dense is None:
-            mixed = np.matmul(tables.mix, series.reshape(2 * order + 1, -1, count)).reshape(2 * order + 1, 2, -1)
-            mixed = mixed.swapaxes(0, 1).reshape(4 * order + 2, -1).view(np.float64)
-            blocks = tables.spread.dot(mixed).view(np.complex128).reshape(order + 1, order + 1, 2, count).swapaxes(1, 2)
+            mixed = np.matmul(tables.mix, series.reshape(2 * order + 1, -1, count))
+            mixed[2, 2:] += tables.linear
+            mixed = mixed.reshape(2 * order + 1, 2, -1).swapaxes(0, 1).reshape(4 * order + 2, -1)
+            found = tables.spread.dot(mixed.view(np.float64)).view(np.complex128)
+            blocks = found.reshape(order + 1, order + 1, 2, count).swapaxes(1, 2)
         else:
             blocks = tables.dense.dot(series.reshape(-1, count)).reshape(order + 1, 2, order + 1, count)
-        blocks += tables.linear
+            blocks += tables.linear
         # Two neighbours of a row are one complex number, of the real parts' unknown and of the imaginary parts'.
         grid = tables.grid.copy()
         matrix, step = grid.view(np.float64), 2 * k
-        first = order * step  # row of the first charge
-        size = first + step
+        first, size = order * step, (order + 1) * step
         placed = grid[:size, : size // 2].reshape(order + 1, k, 2, order + 1, k)
         for n, (one, other) in enumerate(pairs):
             placed[:, one, :, :, other] = blocks[..., n]
