@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _DIFFERENCE_MATRIX = np.array([[0.0, 1.0, 0.0, -1.0], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 1.0]])
 
 
-@dataclass(slots=True, eq=False)  # not frozen: to make one takes a third of the time
+@dataclass(frozen=True, slots=True, eq=False)
 class Coupling:
     """The effect of the contacts between the sheets, one entry for each scene.
 
@@ -165,7 +165,7 @@ def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0,
     return DrivePhase("angular", guide, guide, Terminal(supply, source, lead), Terminal(0.0, source, lead))
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Readings:
     """The answer of one phase; axes over electrodes run A, B, C, D.
 
