@@ -97,6 +97,8 @@ def bare_loop() -> None:
                 if descriptor == sys.stdin.fileno():
                     return
                 data = os.read(descriptor, 4096)
+                if not data:
+                    sys.exit("the far end has no more frames: measure for less long")  # its share would stand still
                 ours.send(data)
                 theirs.recv(4096)
 
@@ -123,6 +125,8 @@ def measure(skins: int, seconds: float) -> dict[str, float]:
         before, began = {name: ran(pid) for name, pid in pids.items()}, time.monotonic()
         session.wait_for(("none",), seconds)
         took = time.monotonic() - began
+        if not all(Path(f"/proc/{pid}/exe").exists() for pid in pids.values()):
+            sys.exit("a process has ended before its share was measured")
         found = {name: 100.0 * (ran(pid) - before[name]) / took for name, pid in pids.items()}
         session.check()
     return found

@@ -190,7 +190,7 @@ class GuardLoop:
         self._heard = dict.fromkeys(ports.helpers, clock())
         self._asked = self._clock()  # when the controller was last asked whether it takes stops
         self._count = 0  # sent last
-        self._out: list[bytes] = []
+        self._out: list[Block] = []  # made bytes of together, which is quicker than one by one
         self._report_at = 0.0  # when the session is told next
         self._outbox = _Outbox(ports, clock)
         self._gone: Source | None = None  # the skin's source, where it may be opened again
@@ -339,7 +339,7 @@ class GuardLoop:
         """Tell the session what went in and came out: at once where anything was decided, else together with more."""
         self._report_at = self._clock() + _REPORT_PERIOD
         if self._out:
-            self._ports.session.send(b"".join(self._out))
+            self._ports.session.send(b"".join([encode_block(block) for block in self._out]))
             self._out.clear()
 
     def _read_channel(self, channel: Channel | None, name: str) -> None:
@@ -436,7 +436,7 @@ class GuardLoop:
             outbox.events.clear()
 
     def _record(self, block: Block) -> None:
-        self._out.append(encode_block(block))
+        self._out.append(block)
 
     def _lose(self, what: str, why: str, item: object) -> None:
         self._forget(item)
