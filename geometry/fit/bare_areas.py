@@ -99,7 +99,8 @@ class BareTally:
 
     def take_more(self, count: int, covered: Bools) -> None:
         """Take what a sheet beside ``count`` others would cover, shape (n,)."""
-        self.take(f"a sheet more would cover it: allow {count + 1} sheets with {4 * (count + 1)} wires", covered)
+        more = count + 1
+        self.take(f"a sheet more would cover it: max_sheets = {more}, which takes {4 * more} wires", covered)
 
     @property
     def areas(self) -> list[BareArea]:

@@ -20,7 +20,7 @@ PLAIN = forearm_scene(port="/dev/ttyUSB0")
 SECOND = PLAIN.replace(
     "[source]", "[[link.sensor]]\nid = 2\nradius1_mm = 37\nradius2_mm = 37\nheight_mm = 50\n{}\n[source]"
 )
-MOTION = "[motion]\nwaypoints_deg = [[0, -1.5708, 1.5708, 0, 0, 0], [1, -1.5708, 1.5708, 0, 0, 0]]\n"
+MOTION = "[motion]\nwaypoints_deg = [[0, -90, 90, 0, 0, 0], [1, -1.5708, 1.5708, 0, 0, 0]]\n"
 MOTION += "speed_deg_s = 30\nacceleration_deg_s2 = 90\n"
 TOUCHED = PLAIN.replace('kind = "serial"', 'kind = "virtual"').replace(
     'port = "/dev/ttyUSB0"', "[[source.touch]]\nstart_s = 1\nend_s = 2\nu_mm = 50\nphi_deg = {}"
@@ -55,7 +55,7 @@ def test_the_scenes_of_the_document_raise_none(text: str) -> None:
         ("[0, 0, 80]", "[0, 0, 80]\nrpy_deg = [0, 40, 0]", "turned by 40 deg against it"),
         ('"/dev/ttyUSB0"', '"/dev/ttyUSB0"\nbaud = 9600', "9600 carries at most 27 frames/s of each of 1 sensors"),
         ('"/dev/ttyUSB0"', '"tcp://10.0.0.1:5000"', "tcp:// is no scheme of pyserial; it has socket://"),
-        ("[reaction]", MOTION + "[reaction]", "motion.waypoints_deg has no angle above 1.5708 deg"),
+        ("[reaction]", MOTION + "[reaction]", "motion.waypoints_deg[2] has no angle above 1.5708 deg"),
     ],
 )
 def test_what_is_hardly_meant_is_warned_of(old: str, new: str, said: str) -> None:

@@ -276,8 +276,10 @@ def _print(found: LinkDesign) -> None:
 def _print_next(design: LinkDesign, output: Path) -> None:
     """Print the commands that can follow."""
     folder = shlex.quote(str(output))
-    sensor = shlex.quote(str(output / ("sensor.toml" if len(design.sheets) == 1 else "sheet-1/sensor.toml")))
-    print_hint(f"real hardware: coneskin firmware {sensor} -o board, then coneskin init {folder} --board uno --help")
+    count = len(design.sheets)
+    sensor = shlex.quote(str(output / ("sensor.toml" if count == 1 else "sheet-N/sensor.toml")))
+    board = "board" if count == 1 else f"board-N, a board for each N from 1 to {count}"
+    print_hint(f"real hardware: coneskin firmware {sensor} -o {board}, then coneskin init {folder} --board uno --help")
     unnamed = design.mesh is None or arm_link(design.name) is None
     which = f" --link LINK, with LINK one of {', '.join(LINK_INDEX)}" if unnamed else ""
     guarded = f"coneskin init {folder} --simulated --arm {DEFAULT_MODEL}{which}, for your model of arm"

@@ -141,7 +141,7 @@ class Collision(RobotError, RuntimeError):
         reaction: what the reaction did, such as "touch; retreat 49.5 mm: the distance is made"; empty where not known.
         standstill_confirmed: True where the arm was measured standing and has not moved since.
         number: of the stop, for ``Session.reset``.
-        event: the ``GuardEvent`` that reported it.
+        event: the ``GuardEvent`` that reported it; ``event.details["ellipse"]`` is how far off the place may be.
     """
 
     def __init__(

@@ -59,12 +59,13 @@ def _units(scene: Scene) -> Iterator[str]:
         said = math.degrees(touch.phi)
         if said <= 1.001 * _TURN and _like_radians(said):
             yield f"source.touch {number}: phi_deg = {said:g} looks like radians: then write {math.degrees(said):.4g}"
-    points = [math.degrees(q) for point in (scene.motion.waypoints if scene.motion else ()) for q in point]
-    if points and max(map(abs, points)) <= 1.001 * _TURN and any(map(_like_radians, points)):
-        yield (
-            f"motion.waypoints_deg has no angle above {max(map(abs, points)):g} deg, which looks like radians: "
-            "1.5708 rad are 90 deg"
-        )
+    for number, point in enumerate(scene.motion.waypoints if scene.motion else (), 1):
+        angles = [math.degrees(q) for q in point]
+        if (most := max(map(abs, angles))) <= 1.001 * _TURN and any(map(_like_radians, angles)):
+            yield (
+                f"motion.waypoints_deg[{number}] has no angle above {most:g} deg, which looks like radians: "
+                "1.5708 rad are 90 deg"
+            )
 
 
 def _sensor_units(where: str, item: PlacedSensor) -> Iterator[str]:

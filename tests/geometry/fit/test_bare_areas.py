@@ -19,7 +19,7 @@ def shares(fit) -> dict[str, float]:  # type: ignore[no-untyped-def]
 def test_a_sheet_too_few_is_told_and_what_it_would_cover() -> None:
     told = shares(cones(placed(shoulder()), max_sheets=1))
     two = cones(placed(shoulder()), max_sheets=2)
-    assert told["a sheet more would cover it: allow 2 sheets with 8 wires"] == pytest.approx(
+    assert told["a sheet more would cover it: max_sheets = 2, which takes 8 wires"] == pytest.approx(
         two.sheets[1].area_share, abs=0.02
     )
     assert not any("sheet more" in area.reason for area in two.bare_areas)

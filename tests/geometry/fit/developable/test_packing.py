@@ -126,7 +126,7 @@ def test_the_second_of_two_ovals_is_bare_for_want_of_a_sheet() -> None:
     one, two = (found_on(mesh, max_sheets=count)[1] for count in (1, 2))
     assert (len(one.sheets), len(two.sheets)) == (1, 2)
     told = {area.reason: area.share for area in one.bare_areas}
-    assert told["a sheet more would cover it: allow 2 sheets with 8 wires"] == pytest.approx(
+    assert told["a sheet more would cover it: max_sheets = 2, which takes 8 wires"] == pytest.approx(
         two.sheets[1].area_share, abs=0.02
     )
     assert not any("sheet more" in area.reason for area in two.bare_areas)
