@@ -41,7 +41,7 @@ def _rtde_errors(doing: str) -> Iterator[None]:
     try:
         yield
     except ValueError as exc:
-        raise ValueError(f"{doing}: {exc}") from exc
+        raise ValueError(f"{doing}: {exc}; speeds are in rad/s, of a straight move in m/s") from exc
     except RuntimeError as exc:
         if isinstance(exc, ConeSkinError):
             raise

@@ -64,7 +64,10 @@ _MEANWHILE = [
 @pytest.mark.parametrize(
     ("error", "why"),
     [
-        (ValueError("The value is not within [0;3.14]"), "ValueError: moveJ: The value is not within [0;3.14]"),
+        (
+            ValueError("The value is not within [0;3.14]"),
+            "ValueError: moveJ: The value is not within [0;3.14]; speeds are in rad/s, of a straight move in m/s",
+        ),
         (RuntimeError("no answer"), "RobotConnectionError: moveJ: no answer"),
     ],
 )
