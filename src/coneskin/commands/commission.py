@@ -15,13 +15,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .terminal import TouchTerminal, add_touch_options
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from coneskin.commissioning.acceptance.procedure import Procedure
 
 

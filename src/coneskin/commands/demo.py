@@ -21,7 +21,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -29,16 +29,13 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RecordingError, RobotRefused
 from coneskin.core.files import explain_os_error
+from coneskin.core.recording.block import Block
 from coneskin.core.text import read_json
-from coneskin.robot.guard.signals.journal import BlockKind, EventName, describe_way
+from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, describe_way
 
 from .terminal import print_hint, print_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from coneskin.core.recording.block import Block
-    from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.runs.replay.run import Run
     from coneskin.scene.values.scene import Scene
     from coneskin.session.session import Session

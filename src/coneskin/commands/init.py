@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,6 @@ from coneskin.robot.sim.machine.states import DEFAULT_MODEL
 from .terminal import print_hint
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from coneskin.design.first_scene import ArmAddress, DesignFolder
     from coneskin.skin.firmware.board_circuit import BoardCircuit
 

@@ -6,26 +6,21 @@ import json
 import math
 import os
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING
 
 from coneskin.core.errors import GeometryError, KinematicsError
 from coneskin.core.files import read_file
 from coneskin.core.text import read_json
+from coneskin.geometry.frustum import Frustum
 from coneskin.robot.arm.kinematics import LINK_INDEX, TUBE_LENGTHS, link_index
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.tables.sensor_tables import build_sensor
-from coneskin.skin.firmware.board_circuit import toml_lines
+from coneskin.skin.firmware.board_circuit import BoardCircuit, toml_lines
+from coneskin.skin.sensor import Sensor
 
 from .folder import DESIGN_FILE
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from coneskin.geometry.frustum import Frustum
-    from coneskin.skin.firmware.board_circuit import BoardCircuit
-    from coneskin.skin.sensor import Sensor
 
 _MAX_BYTES = 4 << 20  # of design.json
 _FILE_HEAD = """\

@@ -17,13 +17,12 @@ from coneskin.geometry.ray_casting import RayCaster
 
 from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
 from .sheets.sheet_design import SheetDesign
+from .workshop.jig import Collar
+from .workshop.placement import DatumFace
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.bare_areas import BareArea
     from coneskin.geometry.fit.touch_weights import TouchWeights
-
-    from .workshop.jig import Collar
-    from .workshop.placement import DatumFace
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 #: one for each reason why a part of a link is bare

@@ -7,17 +7,14 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import is_time
 from coneskin.robot.guard.signals.journal import BlockKind, EventName
 
-from .replay.run import run_path
-
-if TYPE_CHECKING:
-    from .replay.run import Run
+from .replay.run import Run, run_path
 
 _IN_FOLDER = "run.rec"
 _FILE_SUFFIX = ".rec"

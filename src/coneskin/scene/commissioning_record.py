@@ -11,16 +11,13 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.files import explain_os_error, read_file, write_whole
 from coneskin.core.text import read_json
 
-from .values.scene import Commissioning, facts_digest, sensor_facts
-
-if TYPE_CHECKING:
-    from .values.scene import PlacedSensor, Scene
+from .values.scene import Commissioning, PlacedSensor, Scene, facts_digest, sensor_facts
 
 MIN_MARKS = 5  #: marks on each sensor
 MAX_MISS = (0.020, math.radians(25.0))  #: m along the link, and rad about it, by which a mark may be misread at most

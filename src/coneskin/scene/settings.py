@@ -11,7 +11,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import SceneError, SensorError
 from coneskin.core.keys import Key, check
@@ -19,10 +19,7 @@ from coneskin.core.text import suggest
 
 from .reader import TABLES
 from .tables.sensor_tables import sensor_tables
-from .values.scene import sensor_facts
-
-if TYPE_CHECKING:
-    from .values.scene import Scene
+from .values.scene import Scene, sensor_facts
 
 _NAME_EXAMPLE = (
     "write reaction.kind=stop, monitoring.settle_ms=100, reaction.rule.0.kind=slow, sensor.0.touch_level=0.08, "

@@ -9,14 +9,13 @@ from coneskin.core.errors import RobotRefused
 
 from .build import bare_parts
 from .tables.source_tables import source_label
+from .values.scene import ArmScene, PlacedSensor, Scene
 
 if TYPE_CHECKING:
     from coneskin.robot.reaction.rules import Rule
     from coneskin.robot.reaction.types import Reaction
     from coneskin.robot.stop.limits import MonitoringLimits
     from coneskin.skin.sensor import Sensor
-
-    from .values.scene import ArmScene, PlacedSensor, Scene
 
 #: arm.controller_heartbeat -> what it means
 _HEARTBEAT_WORDS = {

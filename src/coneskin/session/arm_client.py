@@ -7,16 +7,13 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, wait_readable
 from coneskin.core.errors import KinematicsError, RobotConnectionError, RobotRefused
 from coneskin.robot.arm.model import ArmModel
-from coneskin.robot.driver.protocol import ProgramDriver, load_driver, require
+from coneskin.robot.driver.protocol import OutputWriter, ProgramDriver, VariableReader, load_driver, require
 from coneskin.robot.driver.values import Waypoint
-
-if TYPE_CHECKING:
-    from coneskin.robot.driver.protocol import OutputWriter, VariableReader
 
 _MAX_ATTEMPTS = 10  # at one request, where this computer held it up until it was void
 _ANSWER_PERIOD = 0.05  # s between two looks at what else may have ended a wait

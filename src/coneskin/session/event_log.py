@@ -31,10 +31,9 @@ from coneskin.core.recording.retention import prune_file
 from coneskin.core.version import code_versions
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, decode_event
 from coneskin.scene.tables.source_tables import source_label
-from coneskin.scene.values.scene import RecordingScene
+from coneskin.scene.values.scene import RecordingScene, Scene
 
 if TYPE_CHECKING:
-    from coneskin.scene.values.scene import Scene
     from coneskin.skin.diagnosis.capture import CaptureWindow
 
 #: kinds of block without which nothing can be replayed

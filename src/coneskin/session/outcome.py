@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from coneskin.core import errors
 from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RobotConnectionError, RobotRefused, SceneError
-from coneskin.robot.guard.signals.journal import TOUCH_CAUSE, EventName
+from coneskin.robot.guard.signals.journal import TOUCH_CAUSE, EventName, GuardEvent
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.scene.values.scene import Scene
 
     from .event_log import EventLog

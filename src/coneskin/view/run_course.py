@@ -12,12 +12,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import RecordingError, RobotConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.core.recording.reader import parts_of
 from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.model import Joints
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
     BlockKind,
@@ -28,13 +29,10 @@ from coneskin.robot.guard.signals.journal import (
     decode_event,
 )
 from coneskin.runs.replay.run import Run, read_run
+from coneskin.scene.values.scene import Scene
 from coneskin.skin.wire import Frame, FrameDecoder
 
 from .stage.stage import Stage, set_stage
-
-if TYPE_CHECKING:
-    from coneskin.robot.arm.model import Joints
-    from coneskin.scene.values.scene import Scene
 
 #: kind of a phase -> its colour, which differ in brightness by 3 and more, so that no eye mistakes the last three
 PHASE_COLOURS = {"unknown": "#6b7280", "active": "#1d7dc9", "moving": "#fff3b8", "stopped": "#4a0d18"}

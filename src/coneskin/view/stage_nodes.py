@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from coneskin.geometry.pose import Pose, Vector
 
 from .stage.level_scale import SHEET_COLOURS, level_colour
-from .stage.solids import joined, revolve
-from .stage.stage import floor_lines
+from .stage.solids import Solid, joined, revolve
+from .stage.stage import Stage, floor_lines
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from .page_server import PageServer
     from .run_course import ContactMark, Moment, RunCourse
-    from .stage.solids import Solid
-    from .stage.stage import Stage
 
 _MARKS_PER_LINK = 6  # nodes for contacts on each link with a sheet, used again and again
 LOCATED = (214, 70, 224)  #: colour of a mark whose place is certain

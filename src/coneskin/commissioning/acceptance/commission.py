@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 from coneskin.commissioning.skin_watch import TouchSession
 from coneskin.core.channel import wait_readable
 from coneskin.core.errors import RobotRefused, RobotTimeout
 from coneskin.core.version import __version__
+from coneskin.robot.arm.model import Joints
 from coneskin.robot.arm.models import arm_model
 from coneskin.robot.driver.protocol import load_driver
 from coneskin.scene.build import place_on_frusta
 from coneskin.scene.commissioning_record import CommissioningRecord, fingerprint
-from coneskin.scene.values.scene import Commissioning, Scene
+from coneskin.scene.values.scene import ArmScene, Commissioning, Scene
 
 from .marks import offer_marks
 from .procedure import Procedure, SensorMarks
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from coneskin.robot.arm.model import Joints
-    from coneskin.scene.values.scene import ArmScene
 
 _START_TIMEOUT = 3.0  # s for the first state
 _STATE_TIMEOUT = 1.0  # s without a state

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 from coneskin.commissioning.sheet_picture import draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
-from coneskin.scene.build import place_on_frusta
+from coneskin.scene.build import SensorOnArm, place_on_frusta
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
-    from coneskin.scene.build import SensorOnArm
     from coneskin.scene.values.scene import Scene
 
     from .procedure import Procedure, SensorMarks

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.commissioning.misreadings import Place
 from coneskin.commissioning.skin_watch import SkinWatch, TouchSession
@@ -21,12 +21,10 @@ from coneskin.core.version import __version__
 from coneskin.geometry.drawing.touch_marks import mark_parts
 from coneskin.scene.tables.sensor_keys import CONE_KEYS
 from coneskin.scene.values.calibration_file import CalibrationRecord, TouchResult, sensor_fingerprint
+from coneskin.skin.sensor import Sensor
 
 from .fit import CalibrationFit, fit_map
 from .touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence, fit_forces
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
 
 
 def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:

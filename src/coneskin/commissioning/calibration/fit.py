@@ -21,14 +21,13 @@ import numpy as np
 from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
 from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
-from coneskin.skin.tolerance import LINE_SHARE, PATCH_SHARE, SHEET_CLASSES
+from coneskin.skin.tolerance import LINE_SHARE, PATCH_SHARE, SHEET_CLASSES, SheetTolerance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from coneskin.core.arrays import Floats
     from coneskin.skin.sensor import Sensor
-    from coneskin.skin.tolerance import SheetTolerance
 
 MIN_TOUCHES = 4  #: at different places
 _MIN_EXTENT = 0.3  # of the sheet, between the outermost of them

@@ -16,29 +16,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.commissioning.skin_watch import skin_source
+from coneskin.commissioning.touching import Mark, Notice
 from coneskin.core.errors import ConeSkinError, SceneError, SkinConnectionError, SkinTimeout
 from coneskin.core.finding import Finding
 from coneskin.scene.build import known_sensors
 from coneskin.scene.required_packages import missing_packages, required_packages
 from coneskin.scene.summary import missing_parts
 from coneskin.scene.suspicions import suspicions
+from coneskin.scene.values.scene import ArmScene, Scene, SourceScene
+from coneskin.skin.sensor import Sensor
 from coneskin.skin.sources.kinds import is_simulated
 from coneskin.skin.sources.serial_port import find_ports, port_group
+from coneskin.skin.sources.source import Source
+from coneskin.skin.wire import Frame
 
 from .guided_touches import examine_touches, guided_touches
 from .hold_ups import begin_measurement, examine_hold_ups
-from .skin_examination import SkinStatistics, examine_line, examine_sensor
+from .skin_examination import SensorStatistics, SkinStatistics, examine_line, examine_sensor
 from .wires import WirePatch, examine_wires
 
 if TYPE_CHECKING:
-    from coneskin.commissioning.touching import Mark, Notice
-    from coneskin.scene.values.scene import ArmScene, Scene, SourceScene
     from coneskin.session.skin_client import SkinClient
-    from coneskin.skin.sensor import Sensor
-    from coneskin.skin.sources.source import Source
-    from coneskin.skin.wire import Frame
-
-    from .skin_examination import SensorStatistics
 
 _LISTEN_TIME = 2.0  # s of an untouched skin
 _READ_TIMEOUT = 0.05  # s

@@ -6,8 +6,9 @@ import functools
 import math
 import operator
 import statistics
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.finding import Finding, Verdict, judged
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
@@ -16,12 +17,8 @@ from coneskin.skin.diagnosis.capture import CaptureWindow
 from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.diagnosis.measurements import MEASURED, find_short
+from coneskin.skin.sensor import Sensor
 from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from coneskin.skin.sensor import Sensor
 
 _CHANNELS = MEASURED[:10]  # of the supplies, one
 

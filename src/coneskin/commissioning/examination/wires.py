@@ -17,9 +17,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from itertools import permutations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from coneskin.core.finding import Finding
+from coneskin.skin.sensor import Sensor
 from coneskin.skin.virtual.circuit import (
     RIGHT_WIRES,
     ConverterInputs,
@@ -30,9 +31,6 @@ from coneskin.skin.virtual.circuit import (
     reorder,
     wire_order,
 )
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
 
 #: electrodes on the terminals A, B, C, D, as in "BACD"; the right order first
 _ORDERS = tuple("".join(order) for order in permutations(RIGHT_WIRES))

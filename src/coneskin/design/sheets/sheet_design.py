@@ -27,6 +27,7 @@ from coneskin.geometry.drawing.electrode_layout import (
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.scene.tables.sensor_tables import with_key_names
@@ -35,14 +36,11 @@ from coneskin.skin.materials import SheetMaterial, match_sheet_materials
 from coneskin.skin.sensor import sheet_resistances
 
 from .assembly import PlacedSheet, assemble, sheet_gap
-from .cable_way import SheetBody
+from .cable_way import Body, CableWay, SheetBody, TabApron
 
 if TYPE_CHECKING:
     from coneskin.geometry.fit.axis_plan import FittedSheet
     from coneskin.geometry.fit.cones import LinkFit
-    from coneskin.geometry.mesh import Mesh
-
-    from .cable_way import Body, CableWay, TabApron
 
 JigSurface = Literal["link", "cone", "none"]
 _MIN_GRIP = 4e-3  # m

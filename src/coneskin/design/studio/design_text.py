@@ -7,10 +7,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from coneskin.core.arrays import Floats, Ints
 from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.workshop.build_figures import side_name
 from coneskin.geometry.displacement_map import heights_by_ray
@@ -18,13 +20,8 @@ from coneskin.geometry.drawing.cut_sheet import LINE_COLOURS, CutSheet
 from coneskin.geometry.drawing.part_labels import PartLabel
 from coneskin.geometry.drawing.svg import to_svg
 from coneskin.geometry.frustum import unroll
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from coneskin.core.arrays import Floats, Ints
-    from coneskin.geometry.placed_frustum import PlacedFrustum
-    from coneskin.geometry.ray_casting import RayCaster
+from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.ray_casting import RayCaster
 
 #: of a deviation, from the mesh far below the side, over on it, to far above
 _BAND_COLOURS = (

@@ -10,13 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from coneskin.core.arrays import Floats, Ints
 from coneskin.core.errors import ConeSkinError
 from coneskin.design.link_design import LinkMesh, load_link
 from coneskin.design.sheets.cable_way import CABLE_RADIUS, MOUNT_REACH
+from coneskin.design.sheets.sheet_design import SheetDesign
 from coneskin.design.workshop.jig import jig_collars
 from coneskin.geometry.fit.touch_weights import read_touch_weights
 from coneskin.geometry.ray_casting import RayCaster
@@ -35,10 +37,6 @@ from .design_text import (
 )
 from .first_view import first_view
 from .workbench import Handles, RobotLinks, Wish, Workbench
-
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats, Ints
-    from coneskin.design.sheets.sheet_design import SheetDesign
 
 _LINK_COLOR = (205, 208, 214)
 _SHEET_COLOR = (164, 205, 150)

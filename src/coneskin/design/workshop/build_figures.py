@@ -11,7 +11,7 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import GeometryError
 from coneskin.design.sheets.cable_way import CableWay, tab_foot
@@ -21,15 +21,13 @@ from coneskin.geometry.drawing.electrode_layout import SheetLayout, SurfaceRecta
 from coneskin.geometry.drawing.nesting import MaterialBed
 from coneskin.geometry.drawing.surface_shape import ShapeCorner, ShapeTab, SurfaceShape, drawing_point
 from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.mesh import Mesh
 from coneskin.scene.tables.sensor_tables import build_sensor
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import sheet_resistances
 
 from .jig import Collar, jig_collars
 from .placement import DatumFace, SheetPlacement, find_placement
-
-if TYPE_CHECKING:
-    from coneskin.geometry.mesh import Mesh
 
 #: wire that lies on the tab, stripped; in the connector's contact; and the loop behind the strain relief [m]
 STRIPPED, IN_CONTACT, LOOP = 8e-3, 4e-3, 20e-3

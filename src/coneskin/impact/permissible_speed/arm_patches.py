@@ -10,16 +10,15 @@ from itertools import pairwise, product
 from typing import TYPE_CHECKING
 
 from coneskin.core.errors import SceneError
-from coneskin.robot.arm.inertia import arm_inertia, joint_torques, loaded, mass_matrix
+from coneskin.geometry.pose import Vector
+from coneskin.robot.arm.inertia import ArmInertia, arm_inertia, joint_torques, loaded, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses, point_jacobian
+from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.scene.build import place_on_arm
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
-    from coneskin.geometry.pose import Vector
-    from coneskin.robot.arm.inertia import ArmInertia
-    from coneskin.robot.arm.model import ArmModel
     from coneskin.scene.values.scene import ArmScene, Scene
 
 ALONG = 3  #: patches along a sheet: its two ends, and the middle

@@ -24,13 +24,12 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
-from coneskin.robot.arm.inertia import arm_inertia, mass_matrix
+from coneskin.robot.arm.inertia import ArmInertia, arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses
+from coneskin.robot.arm.model import ArmModel
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats
-    from coneskin.robot.arm.inertia import ArmInertia
-    from coneskin.robot.arm.model import ArmModel
 
     from .arm_patches import ArmPatch
 

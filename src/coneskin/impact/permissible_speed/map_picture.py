@@ -5,20 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import degree_ticks, write_picture
 from coneskin.robot.arm.kinematics import LINK_INDEX
+from coneskin.scene.values.scene import Scene
 from coneskin.skin.materials import Padding
 
+from .limits_file import LimitsFile
 from .speed_map import LEVERS, SpeedMap, contact_at
 from .taylor_integrator import integrate
-
-if TYPE_CHECKING:
-    from coneskin.scene.values.scene import Scene
-
-    from .limits_file import LimitsFile
 
 _LEVER_INDEX = 4  # of LEVERS: 0.32 m/rad, about that of a forearm
 _MAX_SHEETS = 6  # sheets that are drawn

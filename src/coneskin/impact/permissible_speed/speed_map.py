@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import SceneError
 from coneskin.core.files import explain_os_error, write_whole
@@ -25,19 +25,14 @@ from coneskin.robot.arm.kinematics import link_index
 from coneskin.robot.arm.models import arm_model
 from coneskin.scene.tables.keys import SPEED_LIMIT_KEYS
 from coneskin.scene.tables.speed_limit_tables import limit_digest, limit_fingerprint
-from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene
+from coneskin.scene.values.scene import LimitedPatch, Scene, SpeedLimitScene
 from coneskin.skin.materials import Padding
 
-from .arm_patches import braking_held, inertias_of, motion_positions, patches_of, weigh
+from .arm_patches import ArmPatch, braking_held, inertias_of, motion_positions, patches_of, weigh
 from .extra_way import ExtraWay, extra_ways
 from .limits_file import BodyRegion, ForceLimits, LimitsFile, MeasuredReaction
 from .taylor_integrator import integrate
 from .two_mass_contact import DrivenArm, TwoMassContact
-
-if TYPE_CHECKING:
-    from coneskin.scene.values.scene import Scene
-
-    from .arm_patches import ArmPatch
 
 #: m/s; no faster speed is looked at
 _TOP_SPEED = 5.0

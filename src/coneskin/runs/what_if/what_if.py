@@ -17,7 +17,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import ConeSkinError, RecordingError, needed_package
 from coneskin.core.files import read_file
@@ -28,11 +28,8 @@ from coneskin.robot.guard.signals.journal import BlockKind, EventName, contact_f
 from coneskin.runs.comparison import Comparison, compare_decisions
 from coneskin.runs.decisions import Decisions, decide_again, recorded_decisions
 from coneskin.runs.replay.event_details import Tolerances
-from coneskin.runs.replay.run import read_run
+from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.run_files import run_name
-
-if TYPE_CHECKING:
-    from coneskin.runs.replay.run import Run
 
 _MAX_SIZE = 1 << 24  # bytes
 _TRUTH_KINDS = frozenset({BlockKind.TRUTH})

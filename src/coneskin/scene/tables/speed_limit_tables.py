@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coneskin.core.keys import Key, check
-from coneskin.scene.values.scene import LimitedPatch, SpeedLimitScene, facts_digest
+from coneskin.scene.values.scene import LimitedPatch, Scene, SpeedLimitScene, facts_digest
 
 from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
 from .sensor_tables import read_toml
@@ -25,7 +25,6 @@ from .sensor_tables import read_toml
 if TYPE_CHECKING:
     from coneskin.geometry.frustum import Frustum
     from coneskin.geometry.placed_frustum import PlacedFrustum
-    from coneskin.scene.values.scene import Scene
 
 _MODEL_NUMBER = 2  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB
