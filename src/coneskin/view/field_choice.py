@@ -10,13 +10,14 @@ import math
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from coneskin.core.errors import FieldError
 from coneskin.geometry.pose import Pose
 
 from .stage.level_scale import gradient
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from coneskin.core.arrays import Floats
@@ -99,8 +100,6 @@ class _SheetField:
 
     def _disc(self, contact: _ContactOnSheet) -> Disc | None:
         """Return the disc that reads the contact's level; None where there is no room for one, or the level is 0."""
-        import numpy as np
-
         from coneskin.skin.field.disc import Disc
 
         sheet = self._model.sheet
@@ -153,8 +152,6 @@ class _FieldPatches(NamedTuple):
     @classmethod
     def of(cls, sheet: SheetSurface) -> _FieldPatches:
         """Return the patches of a sheet."""
-        import numpy as np
-
         placed = sheet.item.frustum
         cone = placed.frustum
         edges_u, edges_phi = np.linspace(0.0, cone.slant, _ROWS + 1), np.linspace(0.0, cone.wrap, _COLUMNS + 1)
@@ -186,8 +183,6 @@ def _potential_colours(volts: Floats, low: float, high: float) -> NDArray[np.uin
         low: that has the first colour [V].
         high: that has the last one.
     """
-    import numpy as np
-
     share = np.clip((volts - low) / max(high - low, 1e-12), 0.0, 1.0)
     band = np.minimum(np.floor(share * _COLOUR_BANDS), _COLOUR_BANDS - 1) / (_COLOUR_BANDS - 1)
     knots = np.linspace(0.0, 1.0, len(_LOW_TO_HIGH))
@@ -197,8 +192,6 @@ def _potential_colours(volts: Floats, low: float, high: float) -> NDArray[np.uin
 
 def _as_light(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return colours of a screen (sRGB, IEC 61966-2-1) as light, which is how viser 1.1 takes those of patches."""
-    import numpy as np
-
     share = colours / 255.0
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return (255.0 * light).round().astype(np.uint8)
@@ -266,8 +259,6 @@ class FieldChoice:
             self._legend.content = legend
 
     def _draw(self, name: str, patches: _FieldPatches, colours: Any) -> None:
-        import numpy as np
-
         node = self._nodes.get(name)
         if node is not None:
             if not np.array_equal(node.batched_colors, colours):
@@ -304,8 +295,6 @@ def _range(shown: list[Any]) -> tuple[float, float]:
 
 
 def _legend(low: float, high: float, said: str) -> str:
-    import numpy as np
-
     colours = [
         (int(r), int(g), int(b)) for r, g, b in _potential_colours(np.linspace(low, high, 41), low, high).tolist()
     ]

@@ -11,16 +11,15 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from html import escape
 from itertools import cycle
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from coneskin.core.arrays import Floats
 from coneskin.core.text import printable
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way, stopping_contact
 
 from .run_course import CHANNELS, CONTACT_EVENTS, PHASE_COLOURS, PhaseWords, RunCourse, Series
-
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
 
 NOTICE = (
     '<div id="coneskin-notice">No safety display. What is drawn may be late, old or wrong; '
@@ -254,8 +253,6 @@ def _plots(courses: Sequence[RunCourse]) -> dict[str, list[_Line]]:
 
 def _envelope(series: Series, column: int, zero: float, edges: Floats) -> Floats:
     """Return the least and the largest value of each bin, NaN for one without a value."""
-    import numpy as np
-
     found = np.full(2 * (len(edges) - 1), np.nan)
     first, last = bisect_left(series.times, zero + edges[0]), bisect_right(series.times, zero + edges[-1])
     if first == last:
@@ -277,8 +274,6 @@ _MAX_LINES = 12  # of one plot
 
 def _value_range(what: str, rows: Floats) -> tuple[float, float]:
     """Return from where to where values are drawn: levels and forces from 0, speeds as far below 0 as above."""
-    import numpy as np
-
     known = rows[np.isfinite(rows)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if what == _LEVELS:
@@ -313,8 +308,6 @@ def trace_drawings(courses: Sequence[RunCourse], since: float, until: float, liv
 
 
 def _drawing(what: str, lines: Sequence[_Line], since: float, until: float, ends: tuple[str, str]) -> str:
-    import numpy as np
-
     edges = np.linspace(since, max(until, since + 1e-6), _BIN_COUNT + 1)
     rows = np.array([_envelope(series, column, zero, edges) for _, series, column, zero in lines])
     low, high = _value_range(what, rows)
@@ -339,8 +332,6 @@ def _drawing(what: str, lines: Sequence[_Line], since: float, until: float, ends
 
 def _course(x: Floats, y: Floats) -> str:
     """Return the data of a path with a gap wherever there is no value."""
-    import numpy as np
-
     words, drawing = [], False
     for across, down in zip(x.tolist(), y.tolist(), strict=True):
         if not np.isfinite(down):

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from coneskin.geometry.pose import Pose, Vector
 
 from .stage.level_scale import SHEET_COLOURS, level_colour
@@ -13,7 +15,6 @@ from .stage.solids import Solid, joined, revolve
 from .stage.stage import Stage, floor_lines
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from coneskin.core.arrays import Floats, Ints
@@ -151,8 +152,6 @@ class _MarkNodes:
         self._frame.visible = False
 
     def _draw(self, mark: ContactMark, side: PlacedFrustum, strength: float) -> None:
-        import numpy as np
-
         colour = _PAST if strength < 1.0 else LOCATED if mark.located else _UNCERTAIN
         shade = None if strength >= 1.0 else 0.15 + 0.7 * strength
         arrow, faces = _arrow()
@@ -204,8 +203,6 @@ def _on_sheet(side: PlacedFrustum, point: Vector, rows: Floats) -> tuple[NDArray
         point: in the same frame [m].
         rows: where the band's two edges are from there, along u and around [m], shape (2, n, 2).
     """
-    import numpy as np
-
     u, phi, height = side.locate(point)
     around = phi + rows[..., 1] / max(side.frustum.radius_at(u), _MIN_HALF_AXIS)
     points, normals = side.place(u + rows[..., 0], around)
@@ -216,8 +213,6 @@ def _on_sheet(side: PlacedFrustum, point: Vector, rows: Floats) -> tuple[NDArray
 
 def _half_axes(mark: ContactMark, side: PlacedFrustum) -> Floats:
     """Return the half axes of a mark along u and around [m], shape (2, 2): long enough to be seen, or next to none."""
-    import numpy as np
-
     if mark.ellipse is None or not mark.located:
         return 1e-3 * _MIN_HALF_AXIS * np.eye(2)
     u, phi, _ = side.locate(mark.point)
@@ -232,8 +227,6 @@ def _both_sides(vertices: Floats, faces: Ints) -> tuple[NDArray[np.float32], Int
 
     "side" of viser does the same by another program of the drawing process, whose making takes longer than drawing.
     """
-    import numpy as np
-
     return np.concatenate([_single(vertices)] * 2), np.concatenate([faces, len(vertices) + faces[:, ::-1]])
 
 

@@ -24,13 +24,14 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from coneskin.core.arrays import Floats
 from coneskin.robot.arm.inertia import ArmInertia, arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses
 from coneskin.robot.arm.model import ArmModel
 
 if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
-
     from .arm_patches import ArmPatch
 
 #: m; radius of what is struck. The flatter it is, the sooner a link that tilts has pressed it
@@ -93,8 +94,6 @@ def extra_ways(
     inertias: Sequence[ArmInertia] = (),
 ) -> list[ExtraWay]:
     """Return the largest lag and bend of each patch in some joint positions [rad], with any of some inertias."""
-    import numpy as np
-
     lags, bends = np.zeros(len(patches)), np.zeros(len(patches))
     links = sorted({patch.link for patch in patches})
     for q in positions:
@@ -109,8 +108,6 @@ def extra_ways(
 
 def _worst_lag(levers: Floats, masses: Floats) -> Floats:
     """Return the lag of patches in the worst direction [m/rad], shape (patches,)."""
-    import numpy as np
-
     beyond: Floats = levers @ (masses / np.diag(masses)[:, None]) - levers
     worst: Floats = np.abs(beyond).sum(axis=1)
     return worst
@@ -122,8 +119,6 @@ def _worst_bend(changes: Floats) -> Floats:
     Without what is below 0 on its diagonal, a form is convex in each joint, so that a corner has the most. The changes
     are symmetric, shape (patches, joints, joints) [m/rad^2].
     """
-    import numpy as np
-
     count = changes.shape[-1]
     diagonal = np.eye(count, dtype=bool)
     form = np.where(diagonal, np.maximum(changes, 0.0), changes)
@@ -140,8 +135,6 @@ def _levers_and_changes(
     Returns:
         Levers [m/rad], shape (patches, joints), and changes [m/rad^2], shape (patches, joints, joints), symmetric.
     """
-    import numpy as np
-
     poses = link_poses(arm, q)[: link + 1]
     points = np.array([poses[link].apply(patch.point) for patch in patches])
     normals = np.array([poses[link].rotate(patch.normal) for patch in patches])

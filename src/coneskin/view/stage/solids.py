@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import ArmModel
@@ -46,8 +48,6 @@ def revolve(profile: Sequence[tuple[float, float]], segments: int = _SEGMENT_COU
         profile: radius and z [m], in the order of growing z where the outside is seen from outside.
         segments: around.
     """
-    import numpy as np
-
     angle = np.linspace(0.0, 2.0 * math.pi, segments, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     vertices, faces = [], []
@@ -100,8 +100,6 @@ def joined(solids: Sequence[Solid]) -> list[Solid]:
 
 def put_together(pieces: Sequence[tuple[Floats, Ints]]) -> tuple[Floats, Ints]:
     """Return vertices and faces of several surfaces as those of one."""
-    import numpy as np
-
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
     faces = [start + faces for start, (_, faces) in zip(starts, pieces, strict=False)]
     return np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
@@ -198,8 +196,6 @@ def _solid(name: str, body: BodyScene, place: Vector) -> Solid:
 
 def _plate(half: float) -> tuple[Floats, Ints]:
     """Return vertices and faces of a square plate whose front is in the plane z = 0, seen from z > 0."""
-    import numpy as np
-
     corners = np.array([(x, y, z) for z in (-_WALL_THICKNESS, 0.0) for y in (-half, half) for x in (-half, half)])
     squares = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
     return corners, np.array([face for a, b, c, d in squares for face in ((a, b, c), (a, c, d))])

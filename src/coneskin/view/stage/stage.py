@@ -11,9 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from coneskin.geometry.pose import Pose, Vector
+import numpy as np
 
-from .solids import Solid, body_solids, put_together
+from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.kinematics import MESHED_ARMS, dh_mesh, link_index, link_poses
+
+from .solids import Solid, arm_solids, body_solids, put_together
 
 if TYPE_CHECKING:
     from coneskin.core.arrays import Floats, Ints
@@ -46,8 +49,6 @@ class SheetSurface(NamedTuple):
     @classmethod
     def of(cls, item: SensorOnArm, sensor: Sensor) -> SheetSurface:
         """Return the active area of a sensor at its place on the arm, in the DH frame of its link."""
-        import numpy as np
-
         cone = item.frustum.frustum
         largest = max(cone.radius1, cone.radius2)
         straight = item.surface is None  # a mesh lies below another sheet, and is not quite a cone
@@ -65,8 +66,6 @@ class SheetSurface(NamedTuple):
 
 def _strip(item: SensorOnArm, u: Floats, phi: Floats, above: float) -> tuple[Floats, Ints]:
     """Return vertices and faces of the part of a side between places, so far above what is sensed [m]."""
-    import numpy as np
-
     rows, columns = np.meshgrid(u, phi, indexing="ij")
     points, normals = item.frustum.place(rows, columns)
     if item.surface is not None:
@@ -104,8 +103,6 @@ def _clear_where_buried(
 
 def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> Floats:
     """Return places all over a sheet, in the frame of a link [m], shape (n, 3)."""
-    import numpy as np
-
     cone = sheet.item.frustum.frustum
     u, phi = np.meshgrid(np.linspace(0.0, cone.slant, _ROWS), np.linspace(0.0, cone.wrap, _COLUMNS), indexing="ij")
     points, _ = sheet.item.frustum.place(u, phi)
@@ -115,8 +112,6 @@ def _places(sheet: SheetSurface, poses: Mapping[int, Pose], link: int) -> Floats
 
 def _share_inside(solid: Solid, points: Floats) -> float:
     """Return which share of points is inside of a solid, which is convex as all that is closed here."""
-    import numpy as np
-
     a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     behind = points @ normals.T < np.einsum("ij,ij->i", a, normals)
@@ -133,8 +128,6 @@ def floor_lines(reach: float) -> tuple[Floats, Ints]:
     Args:
         reach: how far an arm on the floor can be from its base [m].
     """
-    import numpy as np
-
     count = max(1, math.ceil(2.0 * reach / SPACING))
     at, end, half = SPACING * np.arange(-count, count + 1), SPACING * count, 0.5 * _LINE_WIDTH
     corners = [np.stack([at + side, np.full_like(at, far)], axis=1) for far in (-end, end) for side in (-half, half)]
@@ -178,8 +171,6 @@ class Stage:
         """Return the pose in the base frame of each link's frame at joint positions q [rad]; None: at rest."""
         if self.model is None:
             return {link: Pose() for link in self.links}
-        from coneskin.robot.arm.kinematics import link_poses
-
         found = link_poses(self.model, REST if q is None else q)
         return {link: found[link] for link in self.links}
 
@@ -207,10 +198,6 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     bodies, starts = tuple(body_solids(scene.bodies)), tuple(place for body in scene.bodies for place in body.parts)
     if scene.arm is None:
         return Stage(title, None, (), sheets, bodies, starts)
-    from coneskin.robot.arm.kinematics import MESHED_ARMS
-
-    from .solids import arm_solids
-
     model = scene.arm.arm_model
     slimmest: dict[int, float] = {}
     for sheet in sheets:
@@ -228,10 +215,7 @@ def _link_meshes(scene: Scene, model: ArmModel) -> list[Solid]:
     found = []
     for link in scene.links:
         if link.mesh is not None:
-            import numpy as np
-
             from coneskin.geometry.mesh import load_mesh
-            from coneskin.robot.arm.kinematics import dh_mesh, link_index
 
             mesh = load_mesh(link.mesh).moved(dh_mesh(model, link.name))
             faces = np.asarray(mesh.faces)
