@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 from coneskin.core.errors import Collision, ConeSkinError, RobotRefused
 from coneskin.core.text import positive_seconds
-from coneskin.robot.guard.signals.journal import SLIDER_HOLDS, EventName
+from coneskin.robot.guard.signals.journal import SLIDER_HOLDS, EventName, GuardEvent
 from coneskin.session.outcome import NOT_CONFIRMED, STANDS, exit_code, stands
 
 from .simulated_arm import simulated_arm
@@ -77,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _guard(args: argparse.Namespace, scene: Scene, publishers: Sequence[EventPublisher]) -> int:
     from coneskin.robot.guard.signals.event_text import EventLines
-    from coneskin.robot.guard.signals.journal import GuardEvent
     from coneskin.session.session import guard
 
     lines = EventLines()

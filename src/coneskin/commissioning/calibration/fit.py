@@ -17,16 +17,15 @@ from itertools import combinations, product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
 from coneskin.skin.tolerance import LINE_SHARE, PATCH_SHARE, SHEET_CLASSES, SheetTolerance
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from coneskin.core.arrays import Floats
     from coneskin.skin.sensor import Sensor
 
 MIN_TOUCHES = 4  #: at different places

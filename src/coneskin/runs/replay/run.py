@@ -19,7 +19,7 @@ from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import ALL_KINDS, Block, is_time
 from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import Recording, read_recording
-from coneskin.core.text import read_json
+from coneskin.core.text import html_card, read_json
 from coneskin.core.version import code_versions, recorded_version
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
@@ -134,8 +134,6 @@ class Run:
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the speed of the fastest joint and the touches, the events, the next call."""
-        from coneskin.core.text import html_card
-
         since, until = self.span
         scale, events = 480.0 / max(until - since, 1e-9), self.events
         speeds = [(scale * (state.time - since), max(map(abs, state.qd))) for state in self.states()]
