@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import GeometryError, SceneError
 from coneskin.core.keys import Key, check
+from coneskin.geometry.frustum import Frustum
 from coneskin.scene.tables.sensor_keys import LINK_CONE_KEYS
-
-if TYPE_CHECKING:
-    from coneskin.geometry.frustum import Frustum
 
 
 def option_name(key: Key) -> str:

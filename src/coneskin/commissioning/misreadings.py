@@ -9,12 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from coneskin.scene.commissioning_record import MAX_MISS
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
+from coneskin.skin.sensor import Sensor
 
 _FULL_TURN = 2.0 * math.pi  # rad
 _MAX_PART = 0.2  # part of the slant, and of the wrap: how well a person finds a mark on a small sensor

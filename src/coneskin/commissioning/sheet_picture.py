@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.frustum import Frustum
 
 OUTLINE = "#222222"  #: colour of lines and letters
 _SHEET_COLOR = "#9fd3c7"

@@ -10,12 +10,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+from coneskin.skin.sensor import Sensor
 
 from .misreadings import Place
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
 
 Reading = TypeVar("Reading")
 REQUESTS = ("mark", "again", "press")  #: kinds of notice on which the person touches the skin

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from coneskin.geometry.fit.bare_areas import BareArea
+from coneskin.geometry.fit.touch_weights import TouchWeights
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
@@ -19,10 +21,6 @@ from .sheet_pictures import FOIL_COLOUR, INK_COLOUR
 from .sheets.sheet_design import SheetDesign
 from .workshop.jig import Collar
 from .workshop.placement import DatumFace
-
-if TYPE_CHECKING:
-    from coneskin.geometry.fit.bare_areas import BareArea
-    from coneskin.geometry.fit.touch_weights import TouchWeights
 
 _SHEET_COLOURS = ("#2a7fb8", "#d1495b", "#6a994e", "#8d5a97")
 #: one for each reason why a part of a link is bare

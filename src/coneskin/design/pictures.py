@@ -5,24 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from coneskin.core.errors import needed_package
 from coneskin.core.picture_file import degree_ticks, picture_style
 from coneskin.geometry.displacement_map import heights_by_ray
+from coneskin.geometry.fit.bare_areas import BareArea
+from coneskin.geometry.fit.touch_weights import TouchWeights
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.ray_casting import RayCaster
 
 from .link_picture import draw_jig, draw_link, draw_robot, draw_weights
 from .sheet_pictures import draw_layout, draw_parts, draw_seam, draw_stack
 from .sheets.sheet_design import SheetDesign
 from .workshop.build_figures import BuildFigures
-
-if TYPE_CHECKING:
-    from coneskin.geometry.fit.bare_areas import BareArea
-    from coneskin.geometry.fit.touch_weights import TouchWeights
-    from coneskin.geometry.mesh import Mesh
 
 
 def draw_pictures(

@@ -12,7 +12,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of, explain_os_error
@@ -34,9 +33,7 @@ from coneskin.scene.settings import resolved_settings
 from .comparison import Comparison, compare_decisions
 from .decisions import SKIN_EVENTS, Decisions, decide_again, recorded_decisions
 from .replay.event_details import Tolerances
-
-if TYPE_CHECKING:
-    from .replay.run import Run
+from .replay.run import Run
 
 #: s before the settling of the guard that the skin needs: 50 untouched frames at 200 Hz, and as much again
 _SKIN_SETTLE = 0.5

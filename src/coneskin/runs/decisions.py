@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
@@ -19,13 +19,10 @@ from coneskin.robot.guard.signals.journal import (
     GuardEvent,
     encode_command,
 )
+from coneskin.scene.values.scene import Scene
 
 from .replay.event_details import Tolerances
-
-if TYPE_CHECKING:
-    from coneskin.scene.values.scene import Scene
-
-    from .replay.run import Run
+from .replay.run import Run
 
 _NUMBER_PATTERN = re.compile(r"[-+]?(?:\d+\.?\d*(?:[eE][-+]?\d+)?|inf|nan)")
 _SLIDER_WORD = "slider"

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 from coneskin.core.errors import MissingExtra
 from coneskin.robot.ur.ur_rtde import wheel_remedy
 from coneskin.skin.sources.kinds import is_simulated
 
-if TYPE_CHECKING:
-    from .values.scene import Scene
+from .values.scene import Scene
 
 
 def required_packages(scene: Scene) -> dict[str, str]:

@@ -9,17 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 from coneskin.core.finding import Finding
+from coneskin.geometry.pose import Pose
+from coneskin.robot.arm.model import ArmModel
 
 from .required_packages import missing_packages
-
-if TYPE_CHECKING:
-    from coneskin.geometry.pose import Pose
-    from coneskin.robot.arm.model import ArmModel
-
-    from .values.scene import LinkScene, PlacedSensor, Scene
+from .values.scene import LinkScene, PlacedSensor, Scene
 
 _TURN = 2.0 * math.pi  # rad
 _EIGHTH = math.pi / 4.0  # rad; angles that people write in radians are mostly multiples of it

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_readable
 from coneskin.core.child_process import spawn
 from coneskin.core.errors import SensorError, SkinConnectionError
 from coneskin.core.recording.block import Block
 from coneskin.robot.guard.signals.journal import BlockKind
-
-if TYPE_CHECKING:
-    import socket
-
-    from coneskin.skin.sensor import Sensor
+from coneskin.skin.sensor import Sensor
 
 _ANSWER_TIMEOUT = 10.0  # s that the process may take to start, or to answer
 

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import power, shifts
 from coneskin.commissioning.touching import Mark
+from coneskin.geometry.pose import Pose, Vector
+from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.vectors import added, cross, dot, minus, scaled
+from coneskin.scene.build import SensorOnArm
 from coneskin.scene.commissioning_record import MIN_MARKS
-
-if TYPE_CHECKING:
-    from coneskin.geometry.pose import Pose, Vector
-    from coneskin.robot.arm.model import ArmModel
-    from coneskin.scene.build import SensorOnArm
-    from coneskin.skin.sensor import Sensor
+from coneskin.skin.sensor import Sensor
 
 MIN_POWER = 2.0  #: tolerances by which each misreading must miss one of the marks
 _MAX_MARKS = 9

@@ -6,18 +6,16 @@ import itertools
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.commissioning.sheet_picture import draw_sheet
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 from coneskin.scene.build import SensorOnArm, place_on_frusta
+from coneskin.scene.values.scene import Scene
 
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
-    from coneskin.scene.values.scene import Scene
-
-    from .procedure import Procedure, SensorMarks
+from .procedure import Procedure, SensorMarks
 
 _MARK_COLOR = "#c0392b"
 _CURVE_POINTS = 61  # of a curve

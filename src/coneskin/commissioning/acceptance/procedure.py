@@ -6,17 +6,14 @@ import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit, miss, tolerance
 from coneskin.commissioning.touching import Doubt, Held, Mark, Notice, TouchJudge
 from coneskin.scene.commissioning_record import MarkResult
+from coneskin.skin.detection.frame.reading import TouchReading
+from coneskin.skin.sensor import Sensor
 
 from .marks import plan_marks
-
-if TYPE_CHECKING:
-    from coneskin.skin.detection.frame.reading import TouchReading
-    from coneskin.skin.sensor import Sensor
 
 _HOLD_TIME = 0.3  # s for which a touch must rest at a certain place
 _REST_RADIUS = 0.008  # m; a place that moves farther does not rest

@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,8 @@ from coneskin.commissioning.misreadings import RIGHT, Place, explain, misfit
 from coneskin.core.arrays import Floats
 from coneskin.core.errors import SkinError
 from coneskin.skin.calibration import MAP_LIMITS, PlaceMap, map_terms
+from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import LINE_SHARE, PATCH_SHARE, SHEET_CLASSES, SheetTolerance
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
 
 MIN_TOUCHES = 4  #: at different places
 _MIN_EXTENT = 0.3  # of the sheet, between the outermost of them

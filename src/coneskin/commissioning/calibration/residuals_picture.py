@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.commissioning.misreadings import miss
 from coneskin.commissioning.sheet_picture import OUTLINE, draw_sheet
 from coneskin.core.errors import SceneError
 from coneskin.core.picture_file import write_picture
 
-if TYPE_CHECKING:
-    from .calibrate import CalibrationResult
-    from .fit import KnownTouch
+from .calibrate import CalibrationResult
+from .fit import KnownTouch
 
 _BEFORE_COLOR, _AFTER_COLOR = "#888888", "#c0392b"
 _ARROW_PART = 0.12  # of the slant, of the longest arrow

@@ -11,18 +11,16 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from coneskin.commissioning.misreadings import Place, miss
 from coneskin.commissioning.touching import Doubt, Held, Mark, Notice, TouchJudge
 from coneskin.core.errors import SensorError, SkinError
 from coneskin.skin.calibration import ForceTable
+from coneskin.skin.detection.frame.reading import TouchReading
+from coneskin.skin.sensor import Sensor
 
 from .fit import MIN_TOUCHES, KnownTouch, agreeing
-
-if TYPE_CHECKING:
-    from coneskin.skin.detection.frame.reading import TouchReading
-    from coneskin.skin.sensor import Sensor
 
 _HOLD_TIME = 0.3  # s for which a touch must rest at a certain place
 _MEAN_TIME = 1.0  # s of readings, at most, that make a mean

@@ -11,7 +11,6 @@ import statistics
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 from coneskin.commissioning.touching import Held, Mark, Notice, Touching, TouchJudge
 from coneskin.core.errors import SkinTimeout
@@ -21,13 +20,11 @@ from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.detection.frame.settings import DetectorSettings
 from coneskin.skin.detection.frame.untouched import UntouchedCurrents, UntouchedZero
 from coneskin.skin.detection.self_test import FrameSelfTest
+from coneskin.skin.sensor import Sensor
+from coneskin.skin.sources.source import Source
 from coneskin.skin.wire import Frame, FrameDecoder
 
 from .wires import READING_NAMES, TouchReadings, touch_places
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
-    from coneskin.skin.sources.source import Source
 
 _HOLD_TIME = 0.3  # s that a touch, or an untouched sensor, must rest
 _TOUCH_CHANGE = 0.04  # of the supply or the full scale, by which a touch moves a reading

@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coneskin.core.arrays import Floats
+from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.placed_frustum import PlacedFrustum
-
-if TYPE_CHECKING:
-    from coneskin.geometry.mesh import Mesh
 
 _FLAT_DISTANCE = 0.2e-3  # m; corners so near to a plane lie in it
 _ALIGNED_COSINE = math.cos(math.radians(2.0))  # faces of the mesh that are tilted less against a plane belong to it

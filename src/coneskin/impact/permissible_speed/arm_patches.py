@@ -7,8 +7,10 @@ import random
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import SceneError
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.inertia import ArmInertia, arm_inertia, joint_torques, loaded, mass_matrix
@@ -16,10 +18,7 @@ from coneskin.robot.arm.kinematics import link_poses, point_jacobian
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.models import ZERO_VELOCITY
 from coneskin.scene.build import place_on_arm
-
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats
-    from coneskin.scene.values.scene import ArmScene, Scene
+from coneskin.scene.values.scene import ArmScene, Scene
 
 ALONG = 3  #: patches along a sheet: its two ends, and the middle
 AROUND = 16  #: around a whole turn
@@ -128,8 +127,6 @@ def weigh(
 
     Source: Khatib, "Inertial properties in robotic manipulation: an object-level framework", IJRR 14 (1995), eq. 9.
     """
-    import numpy as np
-
     cases = list(product(positions, inertias or (arm_inertia(arm),)))
     found = np.empty((len(cases), len(patches)))
     for row, (q, inertia) in enumerate(cases):

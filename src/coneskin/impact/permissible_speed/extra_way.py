@@ -22,7 +22,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,8 +30,7 @@ from coneskin.robot.arm.inertia import ArmInertia, arm_inertia, mass_matrix
 from coneskin.robot.arm.kinematics import link_poses
 from coneskin.robot.arm.model import ArmModel
 
-if TYPE_CHECKING:
-    from .arm_patches import ArmPatch
+from .arm_patches import ArmPatch
 
 #: m; radius of what is struck. The flatter it is, the sooner a link that tilts has pressed it
 BODY_RADIUS = 0.1

@@ -23,13 +23,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import mul
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .contact_course import ContactCourse, ContactState, Stretch, evaluate, first_fall, greatest
 from .two_mass_contact import TwoMassContact
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _SERIES_ORDER = 18
 _SERIES_SHARE = 0.1  # of the tolerance, for the last coefficients of a step over the largest
@@ -105,8 +105,6 @@ class _Collocation:
 
 def _collocate(model: TwoMassContact, start: ContactState, length: float) -> _Collocation | None:
     """Return the step of a length [s], in contact throughout; None where Newton's method finds none."""
-    import numpy as np
-
     arm, body, loss = model.arm, model.body, model.law.loss
     m1, m2 = 1.0 / arm.mass, 1.0 / body.mass  # 0 of an infinite one
     times, integral, powers, legendre = _rule()
@@ -158,7 +156,6 @@ def _collocate(model: TwoMassContact, start: ContactState, length: float) -> _Co
 @cache
 def _rule() -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Return points in (0, 1], matrix of integrals up to them, and what gives powers and last term of gains there."""
-    import numpy as np
     from numpy.polynomial import legendre
 
     ends = np.zeros(POINTS + 1)

@@ -11,20 +11,17 @@ and 0.5 ms (at times 9 ms) while something does, which in the controller's proce
 from __future__ import annotations
 
 import math
+import socket
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.channel import Channel, decode_json, encode_json, pair, wait_readable
 from coneskin.core.child_process import OwnedProcess, spawn
 from coneskin.core.errors import MissingExtra, RobotConnectionError, RobotRefused, RobotTimeout
+from coneskin.scene.values.scene import Scene
 
 from .impact_outcome import ImpactOutcome
-
-if TYPE_CHECKING:
-    import socket
-
-    from coneskin.scene.values.scene import Scene
 
 _TIMEOUT = 30.0  # s; a busy computer holds a process up
 

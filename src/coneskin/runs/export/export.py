@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 from coneskin.core.errors import RecordingError
 from coneskin.core.files import draft_of, explain_os_error
 from coneskin.core.progress import Progress, silent
+from coneskin.runs.replay.run import Run
 
 from .tables import Pieces, Table, table_pieces, write_parquet
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from coneskin.runs.replay.run import Run
 
 
 def _write_npz(path: Path, tables: Mapping[str, Pieces]) -> int:

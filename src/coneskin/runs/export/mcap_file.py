@@ -13,22 +13,20 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from heapq import merge
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from coneskin.core.errors import ConeSkinError, needed_package
 from coneskin.core.progress import Progress, silent
 from coneskin.core.text import printable
 from coneskin.robot.arm.kinematics import link_pose
+from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import skeleton
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
+from coneskin.runs.replay.run import Run
+from coneskin.scene.build import SensorOnArm
 from coneskin.skin.detection.frame.reading import read
-
-if TYPE_CHECKING:
-    from coneskin.robot.arm.model import ArmModel
-    from coneskin.robot.driver.values import ControllerState
-    from coneskin.runs.replay.run import Run
-    from coneskin.scene.build import SensorOnArm
 
 _STATE_WINDOW = 1.0  # s between a contact and the state of the arm in which it is drawn
 _DRAWN_EVERY = 0.02  # s between two drawings of the arm

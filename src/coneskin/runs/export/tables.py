@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import RecordingError, needed_package
 from coneskin.core.files import explain_os_error
@@ -20,10 +20,8 @@ from coneskin.robot.arm.models import JOINT_COUNT
 from coneskin.robot.guard.signals.journal import BlockKind
 from coneskin.runs.decisions import recorded_commands
 from coneskin.runs.replay.event_details import QUANTITIES, is_number, is_vector
+from coneskin.runs.replay.run import Run
 from coneskin.skin.wire import DRIVEN_HEAD, DrivenPotentials, Frame
-
-if TYPE_CHECKING:
-    from coneskin.runs.replay.run import Run
 
 #: column -> its values, one for each row: all of one type, or None where there is none
 Table = Mapping[str, list[Any]]

@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import RecordingError
 from coneskin.core.picture_file import LINE_DASHES, write_picture
 from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.journal import GuardEvent, stopping_contact
+from coneskin.scene.build import SensorOnArm
 from coneskin.scene.values.scene import Scene
 
 from .run import Run
-
-if TYPE_CHECKING:
-    from coneskin.scene.build import SensorOnArm
 
 _EVENT_MARKS = {"speed_reduced": "slows", "resumed": "goes on", "standstill": "stands", "latched": "latched"}
 _MAX_GAP = 0.05  # s between two states, from which on nothing is drawn between them: nobody has measured it

@@ -14,17 +14,15 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.keys import Key, check
+from coneskin.geometry.frustum import Frustum
+from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.scene.values.scene import LimitedPatch, Scene, SpeedLimitScene, facts_digest
 
 from .keys import CURVE_KEYS, MAX_ROWS, PATCH_KEYS, SPEED_LIMIT_KEYS
 from .sensor_tables import read_toml
-
-if TYPE_CHECKING:
-    from coneskin.geometry.frustum import Frustum
-    from coneskin.geometry.placed_frustum import PlacedFrustum
 
 _MODEL_NUMBER = 2  # part of the fingerprint: raise it where the computation changes, so that computed files are void
 _MAX_BYTES = 1 << 20  # of a file; a map of ten sheets has 100 kB

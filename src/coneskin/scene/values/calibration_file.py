@@ -13,16 +13,14 @@ from dataclasses import asdict, dataclass, fields
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from coneskin.core.errors import ConeSkinError, SceneError
 from coneskin.core.files import read_file, write_whole
 from coneskin.core.text import read_json
+from coneskin.skin.sensor import Sensor
 
 from .scene import facts_digest, sensor_facts
-
-if TYPE_CHECKING:
-    from coneskin.skin.sensor import Sensor
 
 _MAX_BYTES = 1 << 20  # of a file, about 250 calibrations
 _FIELD_KINDS = {"float": float, "int": int, "str": str, "bool": bool}  # of a record's fields that are one value each

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from .stage import SheetSurface
+from .stage import SheetSurface
 
 _COLOUR_STEPS = 24  # colours of a sheet: a change below one is not worth a message
 #: quiet, touched and firm: from dark to bright, each with a contrast of 3 and more to the one before, to any eye

@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from coneskin.core.arrays import Floats, Ints
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import LINK_INDEX, dh_mesh
 from coneskin.robot.arm.model import ArmModel
-
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats, Ints
-    from coneskin.scene.values.scene import BodyScene
-
+from coneskin.scene.values.scene import BodyScene
 
 _SEGMENT_COUNT = 24  # around: a flat piece lies .9 % of the radius below the round side
 _CHAMFER_SHARE = 0.16  # of the radius, at the rims of a barrel

@@ -9,21 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from coneskin.core.arrays import Floats, Ints
 from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.kinematics import MESHED_ARMS, dh_mesh, link_index, link_poses
+from coneskin.robot.arm.model import ArmModel
+from coneskin.scene.build import SensorOnArm
+from coneskin.scene.values.scene import Scene
+from coneskin.skin.sensor import Sensor
 
 from .solids import Solid, arm_solids, body_solids, put_together
-
-if TYPE_CHECKING:
-    from coneskin.core.arrays import Floats, Ints
-    from coneskin.robot.arm.model import ArmModel
-    from coneskin.scene.build import SensorOnArm
-    from coneskin.scene.values.scene import Scene
-    from coneskin.skin.sensor import Sensor
 
 _SHEET_HEIGHT = 0.0015  # m above the sensed surface: sheets are that thick, and no link is to shine through
 _MAX_SAGITTA = 0.0005  # m by which a flat piece may lie below the round side, so that the link does not shine through
