@@ -167,7 +167,7 @@ def test_another_scene_gives_other_events(run: Run) -> None:
 def test_another_scene_keeps_its_own_commissioning_and_else_has_that_of_the_run(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("coneskin.scene.build.build_core", lambda scene, placed, detector: scene.commissioning)
+    monkeypatch.setattr("coneskin.runs.replay.run.build_core", lambda scene, placed, detector: scene.commissioning)
     own, bare = Commissioning(False, "its own"), changed(run.scene(), commissioning=None)
     assert run.build_core(changed(bare, commissioning=own)) == own
     assert run.build_core(bare) == run.commissioning

@@ -21,6 +21,8 @@ from coneskin.core.recording.defects import Defect, DefectKind
 from coneskin.core.recording.reader import Recording, read_recording
 from coneskin.core.text import html_card, read_json
 from coneskin.core.version import code_versions, recorded_version
+from coneskin.robot.driver.protocol import ArmDriver, SliderDriver
+from coneskin.robot.driver.values import ControllerState
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
     INPUTS,
@@ -31,6 +33,9 @@ from coneskin.robot.guard.signals.journal import (
     Output,
     decode_event,
 )
+from coneskin.scene.build import SensorOnArm, build_core, build_stream, decode_surfaces, place_on_arm
+from coneskin.scene.reader import parse_scene
+from coneskin.scene.settings import changed_settings, override_detector, override_settings
 from coneskin.scene.values.scene import Commissioning, Scene
 from coneskin.skin.detection.events import TouchBegan, TouchEnded
 from coneskin.skin.wire import Frame, FrameDecoder
@@ -38,10 +43,7 @@ from coneskin.skin.wire import Frame, FrameDecoder
 from .event_details import event_differences
 
 if TYPE_CHECKING:
-    from coneskin.robot.driver.protocol import ArmDriver
-    from coneskin.robot.driver.values import ControllerState
     from coneskin.robot.guard.core import GuardCore
-    from coneskin.scene.build import SensorOnArm
 
 MOST_DIFFERENCES = 5  #: that a replay describes
 
@@ -239,8 +241,6 @@ class Run:
 
     def slider(self) -> Iterator[tuple[float, float]]:
         """Yield host times [s] and positions of the speed slider, from 0 to 1; what cannot be read is left out."""
-        from coneskin.robot.driver.protocol import SliderDriver
-
         if isinstance(driver := self._driver(), SliderDriver):
             for block in self.select(kinds=frozenset({BlockKind.SLIDER})):
                 with suppress(RobotConnectionError):
@@ -259,9 +259,6 @@ class Run:
         Raises:
             SceneError: this version of coneskin cannot read it, or with these settings it is no scene.
         """
-        from coneskin.scene.reader import parse_scene
-        from coneskin.scene.settings import override_settings
-
         header = self.header
         text = override_settings(header["scene"], settings) if settings else header["scene"]
         folder = Path(header["folder"])
@@ -289,8 +286,6 @@ class Run:
         Raises:
             SceneError: this version of coneskin cannot read the scene.
         """
-        from coneskin.scene.settings import changed_settings
-
         then, now = self.recorded_by or "an unknown version", recorded_version(code_versions())
         words = () if then == now else (f"recorded by coneskin {then}, replayed by {now}",)
         changed = changed_settings(self.header.get("resolved"), self.scene())
@@ -303,8 +298,6 @@ class Run:
             SceneError: this version of coneskin cannot read the scene, or a sensor lies on a mesh that is not carried.
             RecordingError: a surface is damaged.
         """
-        from coneskin.scene.build import decode_surfaces, place_on_arm
-
         surfaces = frozenset({BlockKind.SURFACE})
         carried = [*self.copies, *self.select(kinds=surfaces)]
         return place_on_arm(scene or self.scene(), decode_surfaces(b for b in carried if b.kind in surfaces))
@@ -319,9 +312,6 @@ class Run:
         Raises:
             SceneError: the scene cannot be read or built.
         """
-        from coneskin.scene.build import build_core
-        from coneskin.scene.settings import override_detector
-
         placed = None
         if scene is None:
             scene = self.scene(settings)
@@ -352,8 +342,6 @@ class Run:
             SceneError: this version of coneskin cannot read the scene.
             RecordingError: a file of the run has changed since it was opened.
         """
-        from coneskin.scene.build import build_stream
-
         stream = build_stream(self.scene())
         lasting: dict[str, _FoundTouch] = {}
         over: list[_FoundTouch] = []
