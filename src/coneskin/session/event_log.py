@@ -119,15 +119,13 @@ class EventLog:
         fits: Callable[[GuardEvent], bool] = lambda _: True,
     ) -> GuardEvent | None:
         """Return the first of these events that fits, from position ``after`` on; None after the timeout [s]."""
-        end = time.monotonic() + timeout
+
+        def find() -> GuardEvent | None:
+            return next((event for event in self.events[after:] if event.name in names and fits(event)), None)
+
         with self._changed:
-            while True:
-                for event in self.events[after:]:
-                    if event.name in names and fits(event):
-                        return event
-                left = end - time.monotonic()
-                if left <= 0.0 or self.ended or not self._changed.wait(left):
-                    return None
+            self._changed.wait_for(lambda: self.ended or find() is not None, timeout)
+            return find()
 
     def end(self) -> None:
         """Note that no more will come, so that nothing waits any longer."""
