@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import ClassVar, Self
 
 from coneskin.core.errors import RobotConnectionError, RobotTimeout
+from coneskin.core.files import explain_os_error
 
 from .values import StopPath
 
@@ -209,13 +210,9 @@ class TcpStops:
         return False
 
     def _open(self, port: int, timeout: float | None = None) -> socket.socket:
-        try:
+        what = f"cannot reach port {port} of the controller {self.host}, which a stop may need"
+        with explain_os_error(RobotConnectionError, what, f"; {self.advice}"):
             sock = socket.create_connection((self.host, port), self._timeout if timeout is None else timeout)
-        except OSError as exc:
-            raise RobotConnectionError(
-                f"cannot reach port {port} of the controller {self.host}, which a stop may need: {exc.strerror or exc}"
-                f"; {self.advice}"
-            ) from exc
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setblocking(False)
         return sock
