@@ -323,12 +323,7 @@ class _Translator(ExpressionParser):
             number = self._take().line
             self._write(f"elif {self._condition()}:", number)
             self._block("elif", "else", "end")
-        if self._token.text == "else":
-            self._take()
-            self._take(":")
-            self._write("else:")
-            self._block("end")
-        self._take("end")
+        self._last_block("else", "else:")
 
     def _switch(self) -> None:
         self._take()
@@ -340,10 +335,14 @@ class _Translator(ExpressionParser):
             self._write(f"{word} {variable} == {self._condition()}:", number)
             self._block("case", "default", "end")
             word = "elif"
-        if self._token.text == "default":
+        self._last_block("default", "else:" if word == "elif" else "if True:")
+
+    def _last_block(self, word: str, head: str) -> None:
+        """Translate the block for all that is left, where there is one, and the end."""
+        if self._token.text == word:
             self._take()
             self._take(":")
-            self._write("else:" if word == "elif" else "if True:")
+            self._write(head)
             self._block("end")
         self._take("end")
 
