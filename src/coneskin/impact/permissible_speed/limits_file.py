@@ -134,9 +134,7 @@ def _parse_limits(text: str, name: str = "limits") -> LimitsFile:
     except ValueError as exc:
         raise SceneError([f"not TOML: {exc}"], name) from exc
     problems = [f"unknown table [{t}]; {suggest(t, _TABLE_KEYS)}" for t in tables if t not in _TABLE_KEYS]
-    for table, what in _TABLE_KEYS.items():
-        if not isinstance(tables.get(table), dict):
-            problems.append(f"[{table}] is missing: {what}")
+    problems += [f"[{t}] is missing: {what}" for t, what in _TABLE_KEYS.items() if not isinstance(tables.get(t), dict)]
     if problems:
         raise SceneError(problems, name)
     limits = check(tables["limits"], _LIMIT_KEYS, "limits", problems)
