@@ -196,6 +196,14 @@ def _bit(variable: str) -> Callable[[ArmClient, int], bool]:
     return lambda arm, n: bool(arm.states.value(variable) >> n & 1)
 
 
+def _read_register(name: str) -> _Method:
+    return _Method(lambda arm, n: arm.states.value(f"{name}_{n}"), f'states.value("{name}_...")')
+
+
+def _is_stopped(bit: int) -> _Method:
+    return _Method(lambda arm: bool(arm.states.value("safety_status_bits") & bit), "states.reading().safety_mode")
+
+
 def _set_digital(group: str) -> _Method:
     switch = _true(lambda arm, number, on: arm.outputs.set_digital(number, on, group))
     return _Method(switch, f'outputs.set_digital(..., "{group}")')
@@ -269,12 +277,8 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         "isProgramRunning": _Method(
             lambda arm: arm.states.reading().program_running, "states.reading().program_running"
         ),
-        "isProtectiveStopped": _Method(
-            lambda arm: bool(arm.states.value("safety_status_bits") & _PROTECTIVE_BIT), "states.reading().safety_mode"
-        ),
-        "isEmergencyStopped": _Method(
-            lambda arm: bool(arm.states.value("safety_status_bits") & _EMERGENCY_BIT), "states.reading().safety_mode"
-        ),
+        "isProtectiveStopped": _is_stopped(_PROTECTIVE_BIT),
+        "isEmergencyStopped": _is_stopped(_EMERGENCY_BIT),
         **{name: _read(variable) for name, variable in _GETTER_VARIABLES.items()},
         "getSpeedScalingCombined": _Method(
             lambda arm: math.prod(map(arm.states.value, ("speed_scaling", "target_speed_fraction"))),
@@ -282,12 +286,8 @@ NAMES: Mapping[str, _Method] = MappingProxyType(
         ),
         "getDigitalInState": _Method(_bit("actual_digital_input_bits"), "states.reading().digital_input"),
         "getDigitalOutState": _Method(_bit("actual_digital_output_bits"), "states.reading().digital_output"),
-        "getOutputIntRegister": _Method(
-            lambda arm, n: arm.states.value(f"output_int_register_{n}"), 'states.value("output_int_register_...")'
-        ),
-        "getOutputDoubleRegister": _Method(
-            lambda arm, n: arm.states.value(f"output_double_register_{n}"), 'states.value("output_double_register_...")'
-        ),
+        "getOutputIntRegister": _read_register("output_int_register"),
+        "getOutputDoubleRegister": _read_register("output_double_register"),
         "setStandardDigitalOut": _set_digital("standard"),
         "setConfigurableDigitalOut": _set_digital("configurable"),
         "setToolDigitalOut": _set_digital("tool"),
