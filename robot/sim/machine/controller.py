@@ -104,10 +104,7 @@ class Controller(ScriptHost):
         if self.cycle % self.options.steps:
             return
         for secondary in list(self.secondary):
-            try:
-                secondary.turn()
-            except ScriptError as exc:
-                self.fail(secondary.name, exc)
+            self._turn(secondary)
             if not secondary.running:
                 self.secondary.remove(secondary)
                 secondary.close()
@@ -115,14 +112,17 @@ class Controller(ScriptHost):
         program = self.program
         if program is None or self.runtime is not Runtime.PLAYING:
             return
-        try:
-            program.turn()
-        except ScriptError as exc:
-            self.fail(program.name, exc)
+        self._turn(program)
         if not program.running:
             self.stop_program("end of the program")
         elif program.driven != self.cycle and self.runtime is Runtime.PLAYING and not self.arm.blends:
             self.arm.motion = None  # no thread commands a motion in this cycle: the arm brakes
+
+    def _turn(self, program: Program) -> None:
+        try:
+            program.turn()
+        except ScriptError as exc:
+            self.fail(program.name, exc)
 
     # programs
 

@@ -164,6 +164,11 @@ def _choose_domain(domains: list[int], first: int, port: Any, domain: Any) -> No
     domains[first + index_of(port, 2)] = index_of(domain, 2)
 
 
+def _domain_function(domains: str, first: int) -> Callable[..., None]:
+    """Return the function for two terminals, from a first one on, by the name of the list of their domains."""
+    return lambda host, port, domain: _choose_domain(getattr(host.terminals, domains), first, port, domain)
+
+
 #: function -> what it does with the controller; analog values are in A or V, levels of outputs from 0 to 1
 _TERMINAL_FUNCTIONS: dict[str, Callable[..., Any]] = {
     "get_rtde_value": lambda host, name: host.rtde_value(str(name)),
@@ -184,15 +189,9 @@ _TERMINAL_FUNCTIONS: dict[str, Callable[..., Any]] = {
     **dict.fromkeys(
         ("get_standard_analog_out", "get_analog_out"), lambda host, n: host.terminals.ratios[index_of(n, 2)]
     ),
-    "set_standard_analog_input_domain": lambda host, port, domain: _choose_domain(
-        host.terminals.input_domains, 0, port, domain
-    ),
-    "set_tool_analog_input_domain": lambda host, port, domain: _choose_domain(
-        host.terminals.input_domains, 2, port, domain
-    ),
-    "set_analog_outputdomain": lambda host, port, domain: _choose_domain(
-        host.terminals.output_domains, 0, port, domain
-    ),
+    "set_standard_analog_input_domain": _domain_function("input_domains", 0),
+    "set_tool_analog_input_domain": _domain_function("input_domains", 2),
+    "set_analog_outputdomain": _domain_function("output_domains", 0),
     **_digital_functions("standard_", 0, 8),
     **_digital_functions("configurable_", 8, 8),
     **_digital_functions("tool_", 16, 2),

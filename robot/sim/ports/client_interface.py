@@ -275,11 +275,10 @@ class ScriptPort:
         last = True  # of two that move the arm in one batch the first would never start
         kept = []
         for text in reversed(programs):
-            if text.strip() in _COMMAND_LINES or text.lstrip().startswith("sec "):
+            moves = text.strip() not in _COMMAND_LINES and not text.lstrip().startswith("sec ")
+            if last or not moves:
                 kept.append(text)
-            elif last:
-                kept.append(text)
-                last = False
+            last = last and not moves
         for text in reversed(kept):
             command = _COMMAND_LINES.get(text.strip())
             if command is None:
