@@ -48,8 +48,6 @@ def given_cone(args: argparse.Namespace) -> Frustum:
     Raises:
         GeometryError: there is no such cone.
     """
-    from coneskin.geometry.frustum import Frustum
-
     dimensions = given_keys(args, LINK_CONE_KEYS)
     return Frustum(**{"radius2": dimensions["radius1"], **dimensions})
 

@@ -17,6 +17,7 @@ import json
 import math
 
 from coneskin.core.text import finite
+from coneskin.geometry.frustum import unroll
 
 from .dimensions import add_cone_options, given_cone
 
@@ -29,8 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the sector of the cone; the exit code is 0."""
-    from coneskin.geometry.frustum import unroll
-
     cone = given_cone(args)
     sector = unroll(cone)
     facts = {

@@ -16,12 +16,17 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from coneskin.core.arrays import Bools, Floats
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.geometry.fit.axis_plan import FittedSheet
+from coneskin.geometry.fit.side import longest_run
+from coneskin.geometry.fit.surface_samples import sample_surface
+from coneskin.geometry.fit.touch_weights import free_shares
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
@@ -32,11 +37,6 @@ from .link_design import LinkDesign, _fit_link, as_built, room_for
 from .report import _table
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
-    from coneskin.geometry.fit.axis_plan import FittedSheet
 
 _WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another
@@ -96,8 +96,6 @@ class _SweptLink:
 
     @cached_property
     def _tree(self) -> cKDTree:
-        from scipy.spatial import cKDTree
-
         return cKDTree(self.places[:, :2])
 
     def near(self, points: Floats, distance: float) -> Bools:
@@ -123,8 +121,6 @@ def _swept_beside(
     link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh], skins: Mapping[str, LinkDesign]
 ) -> list[_SweptLink]:
     """Return the spaces of the links next to one, and of the sheets that they have already."""
-    from coneskin.geometry.fit.surface_samples import sample_surface
-
     spaces = []
     for joint in joints:
         other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
@@ -291,8 +287,6 @@ def design_robot(
 
 def _clear(fit: FittedSheet, thickness: float, beside: Sequence[_SweptLink]) -> FittedSheet | None:
     """Return a sheet that ends before what moves beside it; None where too little is left."""
-    from coneskin.geometry.fit.side import longest_run
-
     side = fit.placed.frustum
     u = np.linspace(0.0, side.slant, max(2, math.ceil(side.slant / _SWEEP_ROW)) + 1)
     points, normals = fit.placed.place(*np.meshgrid(u, np.linspace(0.0, side.wrap, 121), indexing="ij"))
@@ -314,8 +308,6 @@ def _touchable(
     links: Mapping[str, LinkDesign], joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh]
 ) -> list[tuple[float, float, str, int]]:
     """Return of each sheet what can be touched of its active area, that area [m2], its link and its number."""
-    from coneskin.geometry.fit.touch_weights import free_shares
-
     chance = np.random.default_rng(1)
     free: dict[tuple[str, int], list[float]] = {}
     for _ in range(_POSE_COUNT):

@@ -146,7 +146,6 @@ def _on_tube(link: LinkScene, model: str) -> Iterator[str]:
 
 def _mesh_frame(link: LinkScene, arm: ArmModel) -> Pose:
     """Return the pose of the link's frame of the scene in the frame of its mesh."""
-    from coneskin.geometry.pose import Pose
     from coneskin.robot.arm.kinematics import dh_mesh, link_mesh
 
     if link.frame == "mesh":
