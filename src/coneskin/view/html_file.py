@@ -87,8 +87,7 @@ def _serialized(courses: Sequence[RunCourse], since: float, pictures: Sequence[f
     """Return the scene and its pictures as viser's client reads them."""
     with PageServer("coneskin", port=0x2F00) as server:
         taken = server.serializer()
-        reach = max(course.stage.reach for course in courses)
-        look_at_stages(server, reach, len(courses))
+        look_at_stages(server, max(course.stage.reach for course in courses), len(courses))
         server.scene.set_up_direction("+z")
         nodes = nodes_of_runs(server.scene, courses)
         before = 0.0

@@ -251,10 +251,7 @@ class History:
 
     def feed(self, block: Block) -> None:
         """Take a block; one that cannot be read, which the guard has reported, is passed over."""
-        if block.time > self.until:
-            self.until = block.time
-        if block.time < self.since:
-            self.since = block.time
+        self.since, self.until = min(self.since, block.time), max(self.until, block.time)
         if block.kind == BlockKind.SKIN:
             for frame in self._decoder.feed(block.payload):
                 if (name := self._names.get((frame.device, frame.sensor))) is not None:

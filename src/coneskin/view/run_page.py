@@ -32,8 +32,7 @@ _JUMP_EVENTS = frozenset(
 
 def show_runs(server: PageServer, courses: Sequence[RunCourse]) -> None:
     """Show recordings on a page, to every viewer that connects from now on."""
-    reach = max(course.stage.reach for course in courses)
-    look_at_stages(server, reach, len(courses))
+    look_at_stages(server, max(course.stage.reach for course in courses), len(courses))
     server.on_viewer(lambda client: _Player(client, courses).end)
 
 

@@ -96,8 +96,6 @@ def follow_waypoints(points: Sequence[Sequence[float]], speed: float, accelerati
     return target
 
 
-#: what protects the bodies: the scene's guard, the controller's own force limit, nothing
-PROTECTIONS = ("guard", "force limit", "nothing")
 _STEP_TIME = 0.001  # s
 _COMMAND_DELAY = 5  # steps from a command to the control cycle that obeys it
 _FORCE_LIMIT_DELAY = 4  # steps from the force limit's decision to that cycle; assumed
@@ -112,7 +110,7 @@ class CollisionRun:
         scene: with an arm and its skins.
         bodies: that it may meet.
         q: joint positions at the start [rad].
-        protection: of `PROTECTIONS`.
+        protection: of the bodies: "guard", the scene's; "force limit", the controller's own; or "nothing".
         seed: of the skins' noise.
         bare: parts of the arm without a skin that bodies meet too.
         period: as of `MujocoPlant`.
