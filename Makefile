@@ -37,7 +37,9 @@ dist: $(VENV)/dev.stamp
 	! command -v cc >/dev/null || CONESKIN_COMPILE=1 $(BIN)/python -m build --wheel
 
 compiled: $(VENV)/dev.stamp
+	@echo "compiling takes some minutes of two cores"
 	CONESKIN_COMPILE=1 $(BIN)/python setup.py -q build_ext --inplace
+	$(BIN)/coneskin --version
 
 pure:
 	find -L src \( -name '*.so' -o -name '*.pyd' \) -delete

@@ -97,7 +97,8 @@ class _AdmittanceMotion:
         speed = last.speed + share * (wanted - last.speed)
         if speed < _MIN_SPEED or not placed or against:
             self.last = _PushStep(state.time, speed, progress)
-            clipped_by = ("opposed" if against else "level" if placed else "place",)
+            light = "level" if wanted < _MIN_SPEED else "damping"
+            clipped_by = ("opposed" if against else light if placed else "place",)
             # what is not known, or on the other side, may be pressed now: brake as a stop does, not as a push ends
             gentle = placed and not against
             rate = reaction.acceleration if gentle else max(reaction.acceleration, reaction.deceleration)

@@ -152,7 +152,7 @@ def _registers(host: str, scope: ExaminationScope) -> Iterator[Finding]:
     for what, needed, names in wanted:
         item = f"arm, {what}"
         if not needed:
-            yield Finding(item, "not tried", "this scene does not need them")
+            yield Finding(item, "not tried", "not needed by this scene")
             continue
         try:
             with RtdeConnection(host, _REPLY_TIMEOUT) as connection:

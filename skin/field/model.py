@@ -38,7 +38,8 @@ class FieldModel:
         sheet: the flat sector that both conductive layers share.
         upper_resistance: sheet resistance of the layer with the electrodes A and B [ohm per square].
         lower_resistance: sheet resistance of the layer with the electrodes C and D [ohm per square].
-        tolerance: of every solution's estimated error, relative to the supply.
+        tolerance: of every solution's estimated error, relative to the supply. Below 1e-13, what rounding leaves is
+            taken for less.
 
     Raises:
         FieldError: a resistance is not positive and finite, the tolerance is not in [1e-15, 0.1].

@@ -12,6 +12,9 @@ examples:
   coneskin design upperarm.stl -o skin --options design.toml
   coneskin design upperarm.stl -o skin --set drawings.kerf_mm=0.2 --set sheet.wires=end2
 
+Dimensions are those of the sheets. The link must go on beyond both of their ends, for tie, connector and jig; report.md
+says how far.
+
 The folder then holds report.md, sensor.toml, materials.csv, design.json, and cut/ with a DXF, SVG and PDF file for
 every layer. If the command fails, no folder is left. Exit code: 0 written; 3 no cone fits the mesh; 1 another failure;
 2 wrong usage.

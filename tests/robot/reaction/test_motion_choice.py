@@ -204,6 +204,8 @@ def test_it_brakes_as_a_stop_where_something_else_may_be_pressed_and_gently_wher
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 12.0, ("opposed",))
     step = complying(0.0).update(state, [replace(FOREARM, level=0.1, threshold=0.1)])
     assert (step.qd, step.acceleration, step.clipped_by) == (ZERO_VELOCITY, 4.0, ("level",))
+    step = complying(0.0).update(replace(state, time=0.0), [FOREARM])  # firm, and the motion has just begun
+    assert (step.qd, step.clipped_by) == (ZERO_VELOCITY, ("damping",))
 
 
 # ---- the table
