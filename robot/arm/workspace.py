@@ -14,7 +14,7 @@ from itertools import chain, pairwise
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 
-from .kinematics import LINK_INDEX, dh_mesh, link_poses
+from .kinematics import LINK_INDEX, dh_mesh, link_pose, link_poses
 from .model import ArmModel, Joints
 from .models import MODEL_NAMES, arm_model, is_ur
 from .vectors import added, dot, minus, scaled
@@ -177,10 +177,9 @@ def part_in_front(model: ArmModel, q: Sequence[float], link: int, point: Vector,
     It reaches into a ball as wide as ``_CRUSHING_GAP`` that touches the link at that point [m], and lies nearer to the
     ball's middle than to the point. Point and outward unit normal are in the link's DH frame.
     """
-    poses = link_poses(model, q)
-    place, middle = (poses[link].apply(added(point, scaled(normal, way))) for way in (0.0, 0.5 * _CRUSHING_GAP))
-    for name, number, first, last in arm_parts(model):
-        begin, end = poses[number].apply(first), poses[number].apply(last)
+    pose = link_pose(model, q, link)
+    place, middle = (pose.apply(added(point, scaled(normal, way))) for way in (0.0, 0.5 * _CRUSHING_GAP))
+    for name, (begin, end) in zip(_PART_NAMES, pairwise(skeleton(model, q)), strict=True):
         near = min(0.5 * (_CRUSHING_GAP + _clearance_needed(model)), _to_segment(place, begin, end))
         if _to_segment(middle, begin, end) < near:
             return name

@@ -76,7 +76,7 @@ def _difference(qd: Joints, commanded: Joints) -> float:
 _SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoint queues
 _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
 _MAX_BARE_SPEED = 0.008  # m/s outward of what no skin covers, where allowed: a rigid thing stops it within 0.1 mm
-_MAX_BARE_RATIO = 1.5  # of that speed to the touched surface's, where the arm gives way: a light push finds it slow
+_MAX_BARE_RATIO = 1.5  # of that speed to what the touch asks for, where the arm gives way: a light push finds it slow
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
 
