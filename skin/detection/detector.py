@@ -72,7 +72,7 @@ class _StuckValues:
         return i >= most or j >= most or k >= most or m >= most or n >= most
 
 
-class ReportedTouch:
+class _ReportedTouch:
     """The touches of one sensor as its events tell them.
 
     Args:
@@ -174,7 +174,7 @@ class Detector:
         self._self_test = FrameSelfTest(sensor, self._currents)
         self._inversion = FrameInversion(sensor)
         self._places = TouchPlace(sensor, self.settings, self._currents, self._leak, self._guides)
-        self._told = ReportedTouch(sensor, self.settings)
+        self._told = _ReportedTouch(sensor, self.settings)
         self._against = self._quiet = 0  # frames in a row that speak against what is told, or for it while untouched
         self._contradictions = 0.0  # frames taken for a change of contact, less what good frames have taken off
         self._began = 0.0  # the touch, until it is reported as one that lasts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coneskin.core.errors import GeometryError
-from coneskin.design.sheets.assembly import clear_of_each_other, sheet_gap
+from coneskin.design.sheets.assembly import _clear_of_each_other, sheet_gap
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, cover_seams, design_assembly, design_sheets
 from coneskin.geometry.fit.axis_plan import FittedSheet
@@ -76,7 +76,7 @@ def assert_apart(designs: tuple[SheetDesign, ...]) -> None:
 )
 def test_sheets_that_meet_are_drawn_back_to_the_gap(second: PlacedFrustum) -> None:
     first = at(0.0, Frustum(0.05, 0.05, 0.1))
-    one, two = clear_of_each_other([first, second], THICKNESS, 2e-3)
+    one, two = _clear_of_each_other([first, second], THICKNESS, 2e-3)
     apart = SheetBody(one, THICKNESS), SheetBody(two, THICKNESS)
     assert min(sheet_gap(apart[0], apart[1]), sheet_gap(apart[1], apart[0]))[0] == pytest.approx(2e-3, abs=2e-6)
     lost = 0.1 - one.frustum.slant, second.frustum.slant - two.frustum.slant
@@ -95,7 +95,7 @@ def test_the_ends_of_sheets_about_axes_across_each_other_are_no_joint() -> None:
 
 def test_sheets_apart_stay_as_they_are() -> None:
     places = [at(0.0, Frustum(0.05, 0.05, 0.1)), at(0.2, Frustum(0.03, 0.03, 0.1))]
-    assert clear_of_each_other(places, THICKNESS, 1e-3) == places
+    assert _clear_of_each_other(places, THICKNESS, 1e-3) == places
 
 
 @pytest.mark.long

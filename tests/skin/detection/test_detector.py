@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
-from coneskin.skin.detection.detector import Detector, ReportedTouch
+from coneskin.skin.detection.detector import Detector, _ReportedTouch
 from coneskin.skin.detection.events import SkinEvent, SkinFault, TouchBegan, TouchEnded, TouchMoved
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.detection.frame.faults import Fault
@@ -147,7 +147,7 @@ def test_after_a_frame_that_cannot_be_believed_the_place_waits_for_two():
 
 
 def test_events_of_a_touch_have_all_that_its_frame_says():
-    told = ReportedTouch(SENSOR, DetectorSettings())
+    told = _ReportedTouch(SENSOR, DetectorSettings())
     first = TouchReading(1.0, 0.5, 0.1, 1.0, True, "", 7, 8, (1e-6, 2e-7, 3e-6), 0.004, 0.2, None, (0.01, -0.02))
     line = first._replace(location_valid=False, doubt="a line", elongation=(0.03, 0.7), u=0.2, phi=2.0)
     for frame, event in ((first, told.begin(first)), (line, told.move(line))):

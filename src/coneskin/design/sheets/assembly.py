@@ -61,7 +61,7 @@ def _cut_back(place: PlacedFrustum, start: float, end: float) -> PlacedFrustum:
     return place.part(start, side.slant - end, 0.0, side.wrap) if start or end else place
 
 
-def clear_of_each_other(places: Sequence[PlacedFrustum], thickness: float, gap: float) -> list[PlacedFrustum]:
+def _clear_of_each_other(places: Sequence[PlacedFrustum], thickness: float, gap: float) -> list[PlacedFrustum]:
     """Return places whose sheets keep a gap [m]: ends that are nearer are drawn back, both by as much.
 
     Raises:
@@ -205,7 +205,7 @@ def assemble(
     Raises:
         GeometryError: the sheets cannot keep the gap.
     """
-    cleared = clear_of_each_other(places, thickness, gap)
+    cleared = _clear_of_each_other(places, thickness, gap)
     sides: tuple[SheetSide, ...] = get_args(SheetSide) if wires is None else (wires,)
 
     def variants(place: PlacedFrustum) -> Iterator[_Variant]:
