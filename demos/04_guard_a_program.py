@@ -33,7 +33,6 @@ bare_side = "fast"   # what has no skin leads in the retreat, and nothing is the
 
 [monitoring]
 skin_silence_ms = 1000
-skin_late_ms = 1000
 arm_silence_ms = 1000
 program_silence_ms = 1000
 """

@@ -35,7 +35,6 @@ phi_deg = 90
 
 [monitoring]
 skin_silence_ms = 1000
-skin_late_ms = 1000
 """
 SETTINGS = """
 [tool.pytest.ini_options]

@@ -26,7 +26,6 @@ from tests.support.paths import ROOT
 DEMOS = ROOT / "demos" / "arms"
 PATIENT = """
 [monitoring]
-skin_late_ms = 1000
 skin_silence_ms = 1000
 arm_silence_ms = 1000
 program_silence_ms = 1500

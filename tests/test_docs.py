@@ -152,7 +152,7 @@ class PageRun:
             if name in text and not (self.folder / name).exists():
                 tube(self.folder / name, *sizes)
         text = re.sub(r"coneskin sim-ur(?! --h)", "coneskin sim-ur --host 127.0.0.1", text)
-        text = re.sub(r"\b(skin_silence_ms|skin_late_ms|arm_silence_ms) = \d+", r"\1 = 1000", text)
+        text = re.sub(r"\b(skin_silence_ms|arm_silence_ms) = \d+", r"\1 = 1000", text)
         return re.sub(r"127\.0\.0\.\d+", lambda match: self._host(match[0]), text)
 
     def _host(self, shown: str) -> str:

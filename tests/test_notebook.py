@@ -46,7 +46,6 @@ rate_hz = 250
 kind = "stop"
 [monitoring]
 skin_silence_ms = 1000
-skin_late_ms = 1000
 arm_silence_ms = 1000
 ''')
 home, goal = [-0.7, -1.57, 1.57, -1.57, -1.57, 0.0], [1.0, -1.4, 1.4, -1.57, -1.57, 0.0]

@@ -19,9 +19,7 @@ RETREAT = 'kind = "retreat"\ndistance_mm = 60\nbare_side = "fast"'
 COMPLY = 'kind = "comply"\ndistance_mm = 100\nbare_side = "fast"'
 SLOW = 'kind = "slow"\nslow_to = 0.5\ntime_budget_s = 30'
 LONG_SLOW = f"{SLOW}\npress_mm = 30"  # an arm that goes on until the place of the touch is certain
-MONITORING_TABLE = (
-    "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nstuck_frames = 200\nprogram_silence_ms = 250"
-)
+MONITORING_TABLE = "skin_silence_ms = 250\narm_silence_ms = 250\nstuck_frames = 200\nprogram_silence_ms = 250"
 SECOND_SKIN = """
 [[link]]
 name = "upper_arm"

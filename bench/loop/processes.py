@@ -38,7 +38,7 @@ from tests.support.scenes import forearm_scene
 from .compiled import TREES, paths
 from .far_end import FarEnd
 
-PATIENT_LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500"
+PATIENT_LIMITS = "skin_silence_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500"
 LINKS = ("upper_arm", "shoulder", "wrist_1", "wrist_2", "wrist_3", "base")
 SEVERAL_RATE = 250.0  # Hz of each skin where there are several; the virtual ones are played by one process in Python
 OTHER_SKIN = """

@@ -33,7 +33,6 @@ model = "ladder"
 rate_hz = 1000
 [monitoring]
 skin_silence_ms = 1000
-skin_late_ms = 1000
 """
 TOUCH_TEXT = "[[source.touch]]\nstart_s = {}\nend_s = {}\nu_mm = 120\nphi_deg = 90\n"
 

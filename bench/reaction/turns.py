@@ -32,7 +32,7 @@ from tests.support.scenes import START, forearm_scene
 from .moves import CLOCK, EXTERNAL_MODES, Child, ExternalArm, GuardedArm
 
 MOVES_MODULE = "bench.reaction.moves"
-TIME_LIMITS = "skin_silence_ms = 250\nskin_late_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
+TIME_LIMITS = "skin_silence_ms = 250\narm_silence_ms = 250\nsettle_ms = 10"
 
 
 def chosen(simulated: SimulatedController, mode: str, rng: random.Random) -> tuple[int, float, list[float]]:

@@ -36,7 +36,7 @@ from .browser import PROCESS_KINDS, drawn_pictures, first_picture, resident
 from .guard import guard_rounds, print_lateness
 from .viewer import Viewer, processor_time, waited
 
-TIME_LIMITS = "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000"
+TIME_LIMITS = "skin_silence_ms = 1000\narm_silence_ms = 1000"
 SKIN_TABLE = '"virtual"\nrate_hz = 1000'
 MOVED_JOINTS = (0.5, 0.0, 0.0, 0.0, 0.0, 0.0)  # rad, between the two ends of the motion
 

@@ -77,7 +77,7 @@ class BoardCircuit(NamedTuple):
         found: dict[str, float | int] = {}
         if self.converter is not None:
             if (silence := 4000 // self.converter.rate_hz) >= _USUAL_SILENCE_MS:  # four frames
-                found |= {"skin_silence_ms": silence, "skin_late_ms": silence}
+                found["skin_silence_ms"] = silence
             if self.converter.bits < _QUIET_BITS:
                 found["stuck_frames"] = 0
         if self.facts.clock_ppm > 100:

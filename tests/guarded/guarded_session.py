@@ -28,9 +28,7 @@ from tests.support.scenes import START, commissioned, forearm_scene
 DEADLINE = 60.0  # s for whatever has to happen; a busy computer takes its time
 FAR = [math.radians(300.0), *START[1:]]  # a goal that takes 6 s, longer than any silence that a scene here lets be
 
-PATIENT = (
-    "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
-)
+PATIENT = "skin_silence_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
 #: what a guard says where this computer has held it up in a motion away
 _HELD_UP = ("too old to move away by", "too late to move away by", "the guard has been silent for")
 #: ... and where it touched the arm so late that no way was left, or let it move away so late that its time was used up
@@ -38,7 +36,7 @@ _HELD_UP += ("no retreat: a point of the arm has moved", "the time of 2.0 s is o
 #: ... and where the simulated skin was told so late that the arm moves away that its touch had not become lighter
 _HELD_UP += ("the touch does not become lighter, though",)
 #: ... and where the bytes of a skin that this computer simulates came later than its patient scene allows
-_HELD_UP += ("ms late, skin_late_ms = 1000; a busy computer needs more",)
+_HELD_UP += ("ms late, skin_silence_ms = 1000; a busy computer needs more",)
 TOO_BUSY = 3.0 * (os.cpu_count() or 1)  # processes that want to run, on average: so many leave none of them punctual
 
 

@@ -34,7 +34,6 @@ kind = "virtual"
 rate_hz = 300
 [monitoring]
 skin_silence_ms = 900
-skin_late_ms = 900
 """
 
 

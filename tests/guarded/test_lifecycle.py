@@ -54,7 +54,7 @@ def controller(tmp_path):
 
 @pytest.mark.long
 def test_slow_by_the_controllers_own_slider_and_back(controller):
-    slow = scene_for(controller, {RETREAT: 'kind = "slow"\nslow_to = 0.3\nslow_speed_mm_s = 250\npress_mm = 100'})
+    slow = scene_for(controller, {RETREAT: 'kind = "slow"\nslow_to = 0.3\npress_mm = 100'})
 
     ends = []
 

@@ -34,7 +34,6 @@ u_mm = 200
 phi_deg = 90
 [monitoring]
 skin_silence_ms = 1000
-skin_late_ms = 1000
 """
 
 

@@ -116,7 +116,7 @@ class CollisionRig:
             model, UR_DRIVER, RuleSet(reaction, rules), limits, INTERNAL_PATHS, ReactionPlanner(model)
         )
         stream = TouchStream(
-            [item.sensor for item in skins], DetectorSettings(timing=TimingLimits(late=limits.skin_late))
+            [item.sensor for item in skins], DetectorSettings(timing=TimingLimits(late=limits.skin_silence))
         )
         self.core = GuardCore(stream, [item.guarded() for item in skins], limits, supervisor)
         leading = max(map(abs, qd))

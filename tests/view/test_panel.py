@@ -60,7 +60,7 @@ def test_the_card_of_a_touch_stays_until_the_reset_and_says_what_the_guard_has_r
 
 
 def test_a_stop_for_a_fault_says_one_cause_and_one_remedy(course: RunCourse) -> None:
-    why = "skin: frames are late (50 ms late, skin_late_ms = 20; a busy computer needs more)"
+    why = "skin: frames are late (50 ms late, skin_silence_ms = 20; a busy computer needs more)"
     told = [
         GuardEvent(EventName.ACTIVATED, 1.0, {"request": 0}),
         GuardEvent(EventName.FAULT, 2.0, {"what": why}),
@@ -74,7 +74,7 @@ def test_a_stop_for_a_fault_says_one_cause_and_one_remedy(course: RunCourse) -> 
     assert [line.split()[2].strip(":;") for line in lines] == ["activated", "stop"]
     course.history.events[:] = told[2:]
     card = state_of(course, 3.0)
-    assert card.count("frames are late (50 ms late, skin_late_ms = 20)") == 1
+    assert card.count("frames are late (50 ms late, skin_silence_ms = 20)") == 1
     assert "<td>a busy computer needs more</td>" in card
     assert "<td>arm: nothing comes</td>" in card
     assert next(line for _, line in stop_entries(told[2:], 0.0)).count("late (") == 1

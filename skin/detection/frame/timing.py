@@ -154,7 +154,7 @@ class FrameTiming:
         fast = gained > late and lag <= late + self.held_up
         self._clocks = device_time, quickest, 0.0 if fast else gained, started
         if lag > late + self.held_up:
-            limit = f"{self.lag * 1e3:.1f} ms late, skin_late_ms = {1e3 * late:g}"
+            limit = f"{self.lag * 1e3:.1f} ms late, skin_silence_ms = {1e3 * late:g}"
             self.detail = f"{limit}; a busy computer needs more, or fewer frames a second; or {self._advice('slow')}"
             return Fault.LATE
         if fast:

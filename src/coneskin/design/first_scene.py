@@ -199,7 +199,7 @@ def first_scene(
     lines.append('[recording]\nfolder = "runs"\n')
     limits: dict[str, float] = dict(boards[0].monitoring) if boards else {}
     if not ports:
-        limits |= {key: max(limits.get(key, 0), _STALL_MS) for key in ("skin_silence_ms", "skin_late_ms")}
+        limits["skin_silence_ms"] = max(limits.get("skin_silence_ms", 0), _STALL_MS)
         if arm is not None:
             lines.append(_MOTION_TEXT)
             limits["arm_silence_ms"] = _STALL_MS

@@ -70,7 +70,7 @@ def build_stream(scene: Scene, detector: Mapping[str, Any] | None = None) -> Tou
     from coneskin.skin.detection.stream import TouchStream
 
     limits = scene.monitoring_limits
-    timing = TimingLimits(late=limits.skin_late, clock_drift=limits.clock_drift)
+    timing = TimingLimits(late=limits.skin_silence, clock_drift=limits.clock_drift)
     settings = DetectorSettings(stuck_frames=limits.stuck_frames, timing=timing, **(detector or {}))
     return TouchStream(known_sensors(scene), settings)
 

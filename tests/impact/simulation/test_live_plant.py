@@ -45,9 +45,7 @@ xyz_mm = [-192, -120, 587.5]
 mass_kg = 0.6
 stiffness_n_per_mm = 2
 """
-_PATIENT = (
-    "skin_silence_ms = 1000\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
-)
+_PATIENT = "skin_silence_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
 
 
 def scene_at(host: str) -> Scene:

@@ -89,7 +89,7 @@ def test_what_is_seen_too_late_ends_a_motion_away_whatever_the_scene_permits(kin
     """Up to 9.8 mm farther into a second hand before, where frames came up to 0.25 s late."""
     skin = SkinOnLink(Sensor(CONE.frustum, 0, name="one"), LINK, CONE)
     bodies = (replace(HAND, push=5.0), opposite(0.0))
-    patient = MonitoringLimits(skin_silence=0.25, skin_late=0.25)
+    patient = MonitoringLimits(skin_silence=0.25)
     rig = LaggingRig(MODEL, START_Q, QD, [skin], Reaction(kind, distance=0.06, arm_distance=1.0), limits=patient)
     rig.collide(bodies)
     assert "too old to move away by (50 ms at most" in event(rig, "retreated").details["why"]

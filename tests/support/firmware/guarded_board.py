@@ -10,9 +10,7 @@ from tests.support.scenes import commissioned, forearm_scene
 _SENSOR = "adc_bits = 11\nlead_ohm = 3"
 _BAUD = 500_000
 # patient, as the computer that emulates board and arm at once may stall; the watchdog of the board bites after 250 ms
-_LIMITS = (
-    "skin_silence_ms = 600\nskin_late_ms = 1000\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
-)
+_LIMITS = "skin_silence_ms = 600\narm_silence_ms = 1000\nprogram_silence_ms = 1500\nescalate_ms = 250"
 
 
 def board_scene(host: str, port: str) -> Scene:

@@ -114,34 +114,24 @@ _REACTION_SETTINGS = with_meanings(
     deceleration_rad_s2: deceleration of the leading joint while stopping
     distance_mm: distance by which the touched point retreats, or gives way
     speed_mm_s: speed of the touched point
-    acceleration_rad_s2: acceleration of the leading joint while retreating
     time_budget_s: time after which the retreat ends wherever it is. A touch that slows the arm for longer stops it
-    arm_speed_mm_s: speed that no point of the bare arm exceeds while retreating. 250 is the reduced speed of ISO
-        10218-1
     arm_distance_mm: distance that no point of the bare arm goes from where the retreat began. The tool is not
         known. Points farther out from the joints that turn go farther than the touched point. So a retreat from a
         touch near a joint mostly ends here, before `distance_mm`
     bare_side: whether a retreat, or giving way, may move outward what no skin covers. With "stop" the arm then only
         stops. With "allowed" no bare point is faster than 8 mm/s, and only the motor currents feel what
         it meets. With "fast" it is as fast as elsewhere: only where nothing can be there
-    full_level: level of the touch at which comply gives way with all of `speed_mm_s`
     slow_to: position of the controller's speed slider while slow
-    slow_speed_mm_s: speed of the touched surface below which the arm counts as slow, whatever it was before. From
-        there a stop takes it less than 1 mm
     press_mm: how far the touched surface may move into the touch while the arm is slow, the way of a stop included.
         What moves into it faster is stopped at once
     """,
     Key("deceleration_rad_s2", float, None, low=0.5, high=40.0),
     Key("distance_mm", float, None, low=1.0, high=500.0),
     Key("speed_mm_s", float, None, low=1.0, high=1500.0),
-    Key("acceleration_rad_s2", float, None, low=0.1, high=40.0),
     Key("time_budget_s", float, None, low=0.05, high=60.0),
-    Key("arm_speed_mm_s", float, None, low=1.0, high=5000.0),
     Key("arm_distance_mm", float, None, low=1.0, high=2000.0),
     Key("bare_side", str, None, choices=("stop", "allowed", "fast")),
-    Key("full_level", float, None, low=0.01, high=1.0),
     Key("slow_to", float, None, low=0.05, high=0.9),
-    Key("slow_speed_mm_s", float, None, low=1.0, high=1500.0),
     Key("press_mm", float, None, low=0.1, high=100.0),
 )
 REACTION_KEYS = (
@@ -166,26 +156,22 @@ RULE_KEYS = with_meanings(
 
 MONITORING_KEYS = with_meanings(
     """
-    skin_silence_ms: longest age of a sensor's newest valid frame
-    skin_late_ms: longest time that frames may lag behind the device's clock
+    skin_silence_ms: longest age of a sensor's newest valid frame, by when it came and by the device's clock
     clock_drift_ppm: largest difference in speed of the device's clock and this computer's. A lag that grows more
         slowly is not noticed. Crystals keep 100. A board with a ceramic resonator, as many 8-bit boards, needs 5000
     stuck_frames: frames in which any one of radial current, angular current and supply repeats its value, from
         which on the device counts as stuck; 0 where its readings have no noise
     arm_silence_ms: longest age of the controller's newest state, its way through the network included
     escalate_ms: without a slowdown for this long after a stop, the next stop path is used
-    standstill_rad_s: joint speed below which the arm stands
     settle_ms: time for which all preconditions must hold without a break before the guard becomes active
     program_silence_ms: longest time for which your program may be suspended. A third more holds for the heartbeat of
         driver process or guard watchdog, and for a request
     """,
     Key("skin_silence_ms", float, None, low=2.0, high=1000.0),
-    Key("skin_late_ms", float, None, low=2.0, high=1000.0),
     Key("clock_drift_ppm", float, None, low=1.0, high=50_000.0),
     Key("stuck_frames", int, None, low=0, high=1_000_000),
     Key("arm_silence_ms", float, None, low=4.0, high=1000.0),
     Key("escalate_ms", float, None, low=4.0, high=500.0),
-    Key("standstill_rad_s", float, None, low=1e-4, high=0.1),
     Key("settle_ms", float, None, low=10.0, high=10_000.0),
     Key("program_silence_ms", float, None, low=60.0, high=5000.0),
 )
