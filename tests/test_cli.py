@@ -135,6 +135,19 @@ def test_a_command_with_a_slip_is_named(word: str, near: str, capsys: Output) ->
     assert capsys.readouterr().err.endswith(f"there is no command {word}; did you mean {near}?\n")
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("replay", "--evnts", "x"), "replay: error: unrecognized arguments: --evnts; did you mean --events?"),
+        (("doctor", "a.toml", "b.toml"), "doctor: error: unrecognized arguments: b.toml"),
+        (("runs", "cut", "x", "--arond", "3"), "runs: error: unrecognized arguments: --arond 3"),
+    ],
+)
+def test_an_option_with_a_slip_is_named(words: tuple[str, ...], said: str, capsys: Output) -> None:
+    assert run(*words) == 2
+    assert capsys.readouterr().err.endswith(f"coneskin {said}\n")
+
+
 @pytest.mark.parametrize("word", ["check", "validate"])
 def test_who_wants_to_check_a_scene_is_sent_to_the_doctor(word: str, capsys: Output) -> None:
     assert run(word, "scene.toml") == 2
@@ -237,7 +250,7 @@ def test_guard_check_says_what_is_in_a_scene(tmp_path: Path, capsys: Output) -> 
         "place on sensor 0/0": "certain after about 3 frames of a firm touch: then a second contact of about "
         "2 N (0.7 millisiemens), 20 deg off, is excluded; after 512 frames one of 0.048 millisiemens",
         "source": "virtual",
-        "monitoring": "skin silent for 50 ms or late by 50 ms or without noise for 1000 frames: a fault",
+        "monitoring": "skin silent or late for 50 ms or without noise for 1000 frames: a fault",
         "touches": "1",
     }
     assert run("doctor", scene, "--check") == 0

@@ -6,6 +6,7 @@ import argparse
 import importlib
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 
@@ -132,8 +133,13 @@ def _run(arguments: Sequence[str] | None) -> int:
     if chosen is not None and run is None and chosen == words[0]:
         said = "coneskin doctor SCENE --check does that" if chosen in _CHECK_WORDS else suggest(chosen, COMMANDS)
         parser.error(f"there is no command {chosen}; {said}")
-    args = parser.parse_args(words)
-    assert run is not None  # argparse has ended the program otherwise
+    args, unknown = parser.parse_known_args(words)
+    assert chosen is not None and run is not None  # argparse has ended the program otherwise
+    if unknown:
+        command = commands.choices[chosen]
+        options = re.findall(r"--[\w-]+", command.format_usage()) if unknown[0].startswith("--") else []
+        said = f"; {suggest(unknown[0].partition('=')[0], options)}" if options else ""
+        command.error(f"unrecognized arguments: {' '.join(unknown)}{said}")
     try:
         code = int(run(args))
         print(end="", flush=True)  # not at the end of Python, which tells of a reader that is gone

@@ -179,7 +179,7 @@ def _conditions(rule: Rule) -> str:
 
 
 def _monitoring(limits: MonitoringLimits, arm: bool) -> str:
-    text = f"skin silent for {1e3 * limits.skin_silence:g} ms, or as late"
+    text = f"skin silent or late for {1e3 * limits.skin_silence:g} ms"
     if limits.stuck_frames:
         text += f" or without noise for {limits.stuck_frames} frames"
     if not arm:

@@ -197,7 +197,7 @@ MOTION_KEYS = with_meanings(
     rounds: number of rounds; 0 for no end
     """,
     Key("waypoints_deg", list, low=-363.0, high=363.0, length=6),
-    Key("speed_deg_s", float, low=0.1, high=360.0),
+    Key("speed_deg_s", float, low=1.0, high=360.0),
     Key("acceleration_deg_s2", float, low=1.0, high=2000.0),
     Key("rounds", int, 0, low=0),
 )

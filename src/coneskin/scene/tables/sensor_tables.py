@@ -305,7 +305,11 @@ def read_links(tables: Mapping[str, Any], folder: Path | None, problems: list[st
     links: list[LinkScene] = []
     for number, (where, table) in enumerate(_link_tables(tables), 1):
         values = check(table, LINK_KEYS, where, problems)
-        built = [build_sensor(item, name, problems) for name, item in _sensor_tables(where, table)]
+        built = [
+            build_sensor(item, name, problems)
+            for name, item in _sensor_tables(where, table)
+            if not any(line.startswith(f"{name}.file: ") for line in problems)  # without it all of its keys are missing
+        ]
         sensors = tuple(PlacedSensor(*item) for item in built if item is not None)
         mesh = None if values["mesh"] is None else (folder or Path()) / values["mesh"]
         if mesh is not None and folder is not None and not os.path.isfile(mesh):
