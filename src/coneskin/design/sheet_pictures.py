@@ -275,7 +275,7 @@ def draw_stack(figure: Any, design: SheetDesign) -> None:
     width = max(cut.bounds[2] - cut.bounds[0] for cut in design.cuts) * 1e3
     depth = max(cut.bounds[3] - cut.bounds[1] for cut in design.cuts) * 1e3
     squeeze, lean = 0.38, 0.30
-    pitch = squeeze * depth * 0.62 + 0.05 * width
+    pitch = squeeze * depth + 0.02 * width  # so no part hides the one below
     right = 0.0
     stacked = sorted(design.cuts, key=lambda cut: _PART_ORDER.index(cut.number))
     for level, cut in enumerate(stacked):
