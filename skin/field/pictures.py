@@ -97,9 +97,15 @@ def draw_potential(
         picture = axes.contourf(x, y, volts, np.linspace(volts.min(), volts.max(), 41), cmap="viridis")
         ticks = np.linspace(volts.min(), volts.max(), 6).round(9) + 0.0
         figure.colorbar(picture, ax=axes, label="potential [V]", shrink=0.85, ticks=ticks, format="%.3g")
-    lines = axes.contour(x, y, volts, 11, colors="white" if filled else "tab:blue", linewidths=0.9)
+    levels = np.linspace(volts.min(), volts.max(), 11)[1:-1]  # the outer ones are the electrodes
+    lines = axes.contour(x, y, volts, levels, colors="white" if filled else "tab:blue", linewidths=0.9)
     axes.clabel(lines, fontsize=7, fmt="%.3g")
     _field_lines(axes, field, upper)
+    turn = np.linspace(0.0, 2.0 * np.pi, 73)
+    for disc in field.discs:
+        middle = _plane(sheet, np.asarray(disc.u), np.asarray(disc.phi))
+        rim = 1e3 * disc.radius * np.cos(turn), 1e3 * disc.radius * np.sin(turn)
+        axes.plot(middle[0] + rim[0], middle[1] + rim[1], color="tab:red", linewidth=1.4)
     _outline(axes, sheet, names)
     axes.set_title(title, fontsize=10)
     figure.savefig(path, dpi=130)
