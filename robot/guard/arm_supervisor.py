@@ -354,7 +354,8 @@ class ArmSupervisor:
             self._bar(stale)
         now, touches = self.supervision, self._touches
         mover = "the driver" if self.internal_control else "a program"
-        bar = now.barred or ("" if self._stop.first_was_enough else f"{mover} did not stop the arm")
+        # a stop that the controller made may have been one of ours
+        bar = now.barred if self._stop.first_was_enough else f"{mover} did not stop the arm"
         wanted = now.may_move and bool(touches.placed)
         if wanted:
             self._reaction = touches.hardest()  # how firm it was shows by now

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
+from coneskin.robot.arm.kinematics import link_name
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import ArmSweep, Workspace, part_in_front
 
@@ -182,6 +183,9 @@ def plan_reaction_motion(
         contacts: the touches, as they were last seen.
         space: the room that the arm has.
     """
+    for contact in contacts:
+        if not contact.location_valid:  # nobody knows yet what is in front of it, or behind
+            return f"the place of the touch on the {link_name(contact.link)} is not known"
     sweep = ArmSweep.begin(model, state.q)
     if sweep.distance(at_touch.q) > _MAX_STOPPING_WAY:
         for contact in contacts:

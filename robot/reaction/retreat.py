@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from coneskin.core.errors import KinematicsError
 from coneskin.geometry.pose import Vector
 from coneskin.robot.arm.damped_least_squares import DAMPING_FLOOR, damped_speeds
-from coneskin.robot.arm.kinematics import PlacedPoint, place_point
+from coneskin.robot.arm.kinematics import PlacedPoint, link_name, place_point
 from coneskin.robot.arm.model import ArmModel, Joints
 from coneskin.robot.arm.vectors import dot, minus
 from coneskin.robot.arm.workspace import REACTION_TIME, ArmSweep, Workspace, blocked_joints, reach
@@ -105,7 +105,7 @@ def plan_retreat(
     tracks = []
     for contact in contacts:
         if not contact.location_valid:
-            return Done(f"the place of the touch on link {contact.link} is not known")
+            return Done(f"the place of the touch on the {link_name(contact.link)} is not known")
         length = math.hypot(*contact.normal)
         if not all(math.isfinite(value) for value in contact.point) or not 0.99 < length < 1.01:
             return Done(f"touch on link {contact.link} at {contact.point} m has no unit normal: {contact.normal}")

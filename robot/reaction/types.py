@@ -78,7 +78,7 @@ class Reaction:
         arm_distance: that no point of the bare arm goes from where the motion began [m].
         full_level: level at which comply gives way with its full speed.
         bare_side: what a motion away does that would move a surface outward which no skin covers: "stop" does not
-            begin it, "allowed" makes it slowly, "fast" makes it as any other.
+            begin it, "allowed" makes a retreat slowly, "fast" makes it as any other.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
         press: how far the surface may move into a touch while the arm is slow, the way of a stop included; what

@@ -10,7 +10,7 @@ class MonitoringLimits:
     """Limits that a guard keeps.
 
     Attributes:
-        skin_silence: longest age of a sensor's newest valid frame, by when it came and by the device's clock [s].
+        skin_silence: longest time without a valid frame of a sensor, and longest lag behind the device's clock [s].
         clock_drift: largest difference in speed of the device's clock and this computer's, as a ratio.
         stuck_frames: frames in which the drive currents or the supply show no noise at all, from which on the device
             counts as stuck; 0 where its readings truly have no noise.

@@ -117,6 +117,7 @@ def _run(arguments: Sequence[str] | None) -> int:
             name,
             description=help_text[0].upper() + help_text[1:] + ".",
             formatter_class=HelpFormatter,
+            allow_abbrev=False,
         )
         if name == chosen:
             module = importlib.import_module(module_name)
@@ -134,7 +135,8 @@ def _run(arguments: Sequence[str] | None) -> int:
         said = "coneskin doctor SCENE --check does that" if chosen in _CHECK_WORDS else suggest(chosen, COMMANDS)
         parser.error(f"there is no command {chosen}; {said}")
     args, unknown = parser.parse_known_args(words)
-    assert chosen is not None and run is not None  # argparse has ended the program otherwise
+    assert chosen is not None  # argparse has ended the program otherwise
+    assert run is not None
     if unknown:
         command = commands.choices[chosen]
         options = re.findall(r"--[\w-]+", command.format_usage()) if unknown[0].startswith("--") else []

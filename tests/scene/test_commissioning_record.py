@@ -223,15 +223,18 @@ def test_the_check_lists_it(tmp_path: Path) -> None:
     assert summarize(with_commissioning(scene, 0.0))["commissioning"].startswith("passed on ")
 
 
-@pytest.mark.parametrize(("bare_side", "kind"), [("stop", "retreat"), ("allowed", "retreat"), ("stop", "stop")])
+@pytest.mark.parametrize(
+    ("bare_side", "kind"),
+    [("stop", "retreat"), ("allowed", "retreat"), ("allowed", "comply"), ("fast", "comply"), ("stop", "stop")],
+)
 def test_the_check_names_what_no_skin_covers_where_it_may_not_lead(bare_side: str, kind: str) -> None:
     text = re.sub('bare_side = ".*"', f'bare_side = "{bare_side}"', SERIAL_RETREAT).replace('"retreat"', f'"{kind}"')
     told = summarize(parse_scene(text if kind == "retreat" else text.replace('bare_side = "stop"', "")))
-    assert ("no skin on" in told) is ((bare_side, kind) == ("stop", "retreat"))
+    assert ("no skin on" in told) is ((bare_side, kind) in (("stop", "retreat"), ("allowed", "comply")))
     assert "wrist 3; where one would lead" in told.get("no skin on", "wrist 3; where one would lead")
 
 
-RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\n'
+RULE = '[[reaction.rule]]\nlevel_above = 0.2\nkind = "comply"\nbare_side = "fast"\n'
 STOP_WITH_RULE = VIRTUAL_RETREAT.replace('kind = "retreat"', 'kind = "stop"') + RULE
 
 

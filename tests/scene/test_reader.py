@@ -140,8 +140,8 @@ def test_a_mistake_is_one_line_with_key_rule_unit_and_value(old: str, new: str, 
 
 def test_a_sensor_file_that_is_not_there_is_the_only_mistake() -> None:
     first, rest = FULL.split("[[link.sensor]]", 1)
-    problems = mistakes(first + '[[link.sensor]]\nfile = "no.toml"\n' + rest[rest.index("\n[") :])
-    assert len(problems) == 1 and "sensor 1.file: no.toml cannot be read" in problems[0], problems
+    (problem,) = mistakes(first + '[[link.sensor]]\nfile = "no.toml"\n' + rest[rest.index("\n[") :])
+    assert "sensor 1.file: no.toml cannot be read" in problem
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,15 @@ from coneskin.core.errors import Collision, RobotConnectionError, RobotRefused, 
 from coneskin.robot.guard.signals.journal import GuardEvent
 from coneskin.scene import required_packages
 from coneskin.scene.reader import parse_scene
-from coneskin.session.outcome import NOT_CONFIRMED, STANDS, STILL_RETREATING, braking_time, exit_error, stop_error
+from coneskin.session.outcome import (
+    NOT_CONFIRMED,
+    STANDS,
+    STILL_RETREATING,
+    braking_time,
+    exit_code,
+    exit_error,
+    stop_error,
+)
 from coneskin.session.session import Session
 
 from ..scene.scenes import SERIAL_RETREAT
@@ -51,6 +59,12 @@ def test_a_fault_is_not_called_a_touch():
     error = stop_error(fault, PLACE, STANDS)
     assert type(error) is RobotRefused
     assert "cuff: no valid frame; the arm stands" in str(error)
+
+
+def test_a_slow_arm_that_moves_into_its_touch_too_far_has_collided():
+    stop = GuardEvent("stopping", 1.0, {"why": "while slow, the surface would move 3.0 mm", "contact": {"number": 1}})
+    assert type(stop_error(stop, PLACE, STANDS, "while slow, the surface would move 3.0 mm")) is Collision
+    assert exit_code([stop], arm=True) == 3
 
 
 def test_the_time_to_brake_is_that_of_the_gentlest_rule():

@@ -76,7 +76,6 @@ def _difference(qd: Joints, commanded: Joints) -> float:
 _SETPOINT_PERIOD = 0.004  # s; every second controller cycle, so that no setpoint queues
 _START_TIMEOUT = 0.5  # s after which a setpoint program that does not run will not start any more
 _MAX_BARE_SPEED = 0.008  # m/s outward of what no skin covers, where allowed: a rigid thing stops it within 0.1 mm
-_MAX_BARE_RATIO = 1.5  # of that speed to what the touch asks for, where the arm gives way: a light push finds it slow
 _BARE_STEP = 0.02  # s ahead over which that speed is taken
 
 
@@ -128,7 +127,7 @@ class ReactionPlanner:
         motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
-        if self._bare is not None and reaction.bare_side == "stop":
+        if self._bare is not None and not _may_lead(reaction):
             toward: ReactionMotion | str = motion
             if motion.how == "push":
                 away = replace(reaction, kind="retreat")
@@ -139,7 +138,8 @@ class ReactionPlanner:
             if isinstance(step, Done):
                 return step.reason
             time = (reaction.distance - step.progress) / step.away
-            if why := _bare_way(self._bare, here.q, [q + time * v for q, v in zip(here.q, step.qd, strict=True)]):
+            there = [q + time * v for q, v in zip(here.q, step.qd, strict=True)]
+            if why := _bare_way(self._bare, here.q, there, motion.how):
                 return why
         program = None
         if self._watchdog_hz is not None:
@@ -156,14 +156,19 @@ class ReactionPlanner:
         return replace(reaction, acceleration=min(reaction.acceleration, self._held_braking(here.q, step.qd)))
 
 
-def _bare_way(bare: BareSides, q: Joints, there: Sequence[float]) -> str:
+def _may_lead(reaction: Reaction) -> bool:
+    """Tell whether a bare side may lead. Where the arm gives way to a push, only if the scene says nothing is there."""
+    return reaction.bare_side == "fast" or (reaction.bare_side == "allowed" and reaction.kind != "comply")
+
+
+def _bare_way(bare: BareSides, q: Joints, there: Sequence[float], how: str) -> str:
     """Return why the arm must not go there from q. Empty where no bare side moves outward by more than a little."""
     way, part = bare.way(q, there)
     if way <= MAX_BARE_WAY:
         return ""
     return (
         f"no skin covers the {part}, which would lead: it may move outward by {1e3 * MAX_BARE_WAY:g} mm, not more; "
-        'cover it, or write bare_side = "allowed" in [reaction]'
+        f'cover it, or write bare_side = "{"fast" if how else "allowed"}" in [reaction]'
     )
 
 
@@ -201,8 +206,8 @@ class MotionStream:
         self._motion, self._program, self._torque = motion, program, torque
         self.progress, self.how = 0.0, motion.how
         self._bare = None if reaction.bare_side == "fast" else bare
-        self._allowed = reaction.bare_side == "allowed"  # a bare side may lead, slowly
-        leads = self._allowed and bare is not None
+        self._slow_lead = _may_lead(reaction)  # a bare side may lead, slowly
+        leads = self._slow_lead and self._bare is not None
         self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push", leads)
         self._resistance = ResistanceMonitor(model, torque, self.how == "push")
         self._start, self._began = here.q, here.time
@@ -258,13 +263,12 @@ class MotionStream:
     def _limit(self, bare: BareSides, state: ControllerState, step: JointVelocity) -> JointVelocity | str:
         """Return the step no faster than a bare side may move outward, or why there is none."""
         ahead = [q + _BARE_STEP * v for q, v in zip(state.q, step.qd, strict=True)]
-        if not self._allowed:
-            return _bare_way(bare, self._start, ahead) or step
+        if not self._slow_lead:
+            return _bare_way(bare, self._start, ahead, self.how) or step
         speed = bare.way(state.q, ahead)[0] / _BARE_STEP
-        most = min(_MAX_BARE_SPEED, _MAX_BARE_RATIO * step.away) if self.how else _MAX_BARE_SPEED
-        if speed <= most:
+        if speed <= _MAX_BARE_SPEED:
             return step
-        share = most / speed
+        share = _MAX_BARE_SPEED / speed
         by = (*step.clipped_by, "bare side")
         return replace(step, qd=tuple(share * v for v in step.qd), away=share * step.away, clipped_by=by)
 

@@ -195,9 +195,9 @@ class SpeedReduction:
         return touch.trouble(time, self.slider)
 
     def put_back(self, time: float, out: Outputs) -> None:
-        """End it: put the slider back where it was, unless a stop needs it at 0 or a person has moved it since."""
+        """End it: put the slider back where it was, unless a stop needs it at 0 or a person was seen to move it."""
         touch, self.now = self.now, None
-        if touch is not None and self._halted_from is None and touch.puts_back(self.known(time)):
+        if touch is not None and self._halted_from is None and touch.puts_back(self.slider):
             out.append(SetSpeedSlider(touch.before))
             self.slider, self._last = touch.before, (time, touch)
 

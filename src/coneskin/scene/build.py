@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
     from .values.scene import Scene, SpeedLimitScene
 
-_AWAY_KINDS = "retreat", "comply"  # of a reaction that moves the arm
 _MAX_DEPTH = 0.012  # m that a mesh may lie below the sensor on it: five layers, and the deviation of the fit
 
 
@@ -92,7 +91,8 @@ def withheld_motion(scene: Scene) -> str:
 def bare_parts(scene: Scene) -> str:
     """Return the parts of the arm without a skin, where no reaction may move it if one leads; empty where it may."""
     reactions = scene.default_reaction, *(rule.reaction for rule in scene.rules)
-    if scene.arm is None or not any(one.kind in _AWAY_KINDS and one.bare_side == "stop" for one in reactions):
+    kept = {("retreat", "stop"), ("comply", "stop"), ("comply", "allowed")}
+    if scene.arm is None or not kept.intersection((one.kind, one.bare_side) for one in reactions):
         return ""
     from coneskin.robot.reaction.bare_side import BareSides
 

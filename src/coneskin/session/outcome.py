@@ -68,7 +68,7 @@ def stop_error(
         outcome: STANDS, STILL_RETREATING or NOT_CONFIRMED.
         reaction: what the reaction did, as the event "latched" says it; empty where that is not known.
     """
-    if contact is None or stop.details["why"] != TOUCH_CAUSE:
+    if contact is None or not _is_touch(stop):
         return RobotRefused(f"the guard has stopped the arm: {stop.details['why']}; {outcome}")
     where = contact.details
     return Collision(
@@ -80,6 +80,12 @@ def stop_error(
         reaction,
         int(stop.details.get("stop", 0)),
     )
+
+
+def _is_touch(event: GuardEvent) -> bool:
+    """Tell whether an event is a stop for a touch, one included that the arm moved into too far while it was slow."""
+    details = event.details
+    return event.name == EventName.STOPPING and (details["why"] == TOUCH_CAUSE or "contact" in details)
 
 
 def activation_error(
@@ -134,7 +140,7 @@ def exit_code(events: Sequence[GuardEvent], arm: bool) -> int:
     on_purpose = {event.details["what"] for event in events if event.name == EventName.ENDING}
     stops = [event.details["why"] for event in events if event.name == EventName.STOPPING]
     names = {event.name for event in events}
-    if TOUCH_CAUSE in stops or (not arm and EventName.CONTACT in names):
+    if any(map(_is_touch, events)) or (not arm and EventName.CONTACT in names):
         return 3
     if not arm and EventName.FAULT in names:
         return 1

@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -80,6 +81,13 @@ def test_what_it_may_have_caught_between_its_links_as_it_stopped_it_only_stops(k
     x, y, z = IN_THE_CORNER.normal
     outside = ContactOnLink(3, (0.067, 0.0, -0.059), (-x, -y, -z), 0.9, True, 0.1, number=1)
     assert refused(FIRST, outside, kind) != caught
+
+
+@pytest.mark.promise("P02")
+@pytest.mark.parametrize("kind", ["retreat", "comply"])
+def test_where_the_place_of_a_touch_is_not_known_no_motion_begins(kind):
+    """An arm that complied began all the same, and moved once the place was certain: into what nobody had looked at."""
+    assert refused(STOOD, replace(IN_THE_CORNER, location_valid=False), kind).endswith("forearm is not known")
 
 
 def test_a_part_is_in_front_where_it_reaches_into_a_ball_of_120_mm_at_the_touch():

@@ -89,7 +89,7 @@ def test_touches_on_two_links_are_both_left() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"location_valid": False}, "the place of the touch on link 3 is not known"),
+        ({"location_valid": False}, "the place of the touch on the forearm is not known"),
         ({"link": 0}, "the base was touched, and no joint moves it"),
         ({"normal": (0.0, 0.0, 0.0)}, "no unit normal"),
         ({"point": (math.nan, 0.0, 0.0)}, "no unit normal"),

@@ -45,7 +45,7 @@ from .snapshot import Snapshot, restore, save
 REACTIONS = {
     "stop": 'kind = "stop"',
     "slow": 'kind = "slow"\ntime_budget_s = 1\npress_mm = 50',
-    "comply": 'kind = "comply"\ndistance_mm = 20\nbare_side = "allowed"',
+    "comply": 'kind = "comply"\ndistance_mm = 20\nbare_side = "fast"',
     "retreat": 'kind = "retreat"\ndistance_mm = 20\nbare_side = "allowed"',
 }
 CONTROLS = ("internal", "external")

@@ -119,8 +119,8 @@ _REACTION_SETTINGS = with_meanings(
         known. Points farther out from the joints that turn go farther than the touched point. So a retreat from a
         touch near a joint mostly ends here, before `distance_mm`
     bare_side: whether a retreat, or giving way, may move outward what no skin covers. With "stop" the arm then only
-        stops. With "allowed" no bare point is faster than 8 mm/s, and only the motor currents feel what
-        it meets. With "fast" it is as fast as elsewhere: only where nothing can be there
+        stops. With "allowed" it may in a retreat. No bare point is faster than 8 mm/s, and only the motor currents
+        feel what it meets. With "fast" it is as fast as elsewhere: only where nothing can be there
     slow_to: position of the controller's speed slider while slow
     press_mm: how far the touched surface may move into the touch while the arm is slow, the way of a stop included.
         What moves into it faster is stopped at once
@@ -156,7 +156,8 @@ RULE_KEYS = with_meanings(
 
 MONITORING_KEYS = with_meanings(
     """
-    skin_silence_ms: longest age of a sensor's newest valid frame, by when it came and by the device's clock
+    skin_silence_ms: longest time without a valid frame of a sensor, and longest lag of its frames behind the
+        device's clock. After both, what was measured last is twice as old
     clock_drift_ppm: largest difference in speed of the device's clock and this computer's. A lag that grows more
         slowly is not noticed. Crystals keep 100. A board with a ceramic resonator, as many 8-bit boards, needs 5000
     stuck_frames: frames in which any one of radial current, angular current and supply repeats its value, from

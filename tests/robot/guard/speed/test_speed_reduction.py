@@ -136,6 +136,17 @@ def test_a_slider_that_a_stop_has_put_to_0_stays_there_until_the_reset():
     assert out == [SetSpeedSlider(1.0)]
 
 
+def test_a_slider_that_is_not_heard_any_more_goes_back_to_where_it_was():
+    """It stayed at 20 %, and the next guard took that for the person's own."""
+    reduction, out = SpeedReduction(arm_model("UR5e"), used=True, silence=0.05), []
+    state = ControllerState(10.0, 1.0, (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), ZERO_VELOCITY, True, False, True)
+    reduction.feed(10.0, 0.9)
+    assert reduction.begin(10.0, state, Reaction(kind="slow", slow_to=0.2), MonitoringLimits(), [], out)
+    reduction.feed(10.02, 0.2)
+    reduction.put_back(11.0, out)
+    assert [one for one in out if isinstance(one, SetSpeedSlider)] == [SetSpeedSlider(0.2), SetSpeedSlider(0.9)]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("setting", [0.1, 0.3])
 def test_a_person_who_slows_the_arm_between_two_touches_is_heard(setting):
