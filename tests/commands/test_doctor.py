@@ -15,7 +15,7 @@ from coneskin.core.finding import Finding, Verdict
 from coneskin.robot.sim.process import free_host
 from coneskin.scene.reader import load_scene
 from tests.support.paths import SHARED_DATA
-from tests.support.scenes import forearm_scene
+from tests.support.scenes import forearm_scene, write_passed_record
 
 from ..scene.scenes import SKIN_ONLY
 
@@ -86,6 +86,31 @@ def test_the_next_command_is_for_what_was_examined(
     Path("scene.toml").write_text(text)
     main(["doctor", "scene.toml", "--simulated"])
     assert capsys.readouterr().out.splitlines()[-1] == said
+
+
+@pytest.mark.parametrize(("passed", "said"), [(False, "commission"), (True, "guard")])
+def test_what_was_commissioned_need_not_be_again(
+    passed: bool, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    monkeypatch.setattr(Doctor, "examine", lambda doctor: doctor.findings.append(Finding("wires", "ok", "")))
+    monkeypatch.setattr("coneskin.commands.doctor.simulated_arm", lambda scene: contextlib.nullcontext())
+    path = tmp_path / "scene.toml"
+    path.write_text(forearm_scene(reaction='kind = "retreat"'))
+    if passed:
+        write_passed_record(load_scene(path))
+    main(["doctor", str(path), "--simulated"])
+    assert capsys.readouterr().out.splitlines()[-1] == f"next: coneskin {said} {path} --simulated"
+    main(["doctor", str(path), "--check"])
+    assert (f"coneskin commission {path.name} --simulated" in capsys.readouterr().out) is not passed
+
+
+def test_a_skin_that_is_late_with_each_frame_cannot_be_guarded(tmp_path: Path, capsys: Output) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(SKIN_ONLY.replace('kind = "virtual"', 'kind = "virtual"\nrate_hz = 3'))
+    assert main(["doctor", str(path), "--check"]) == 1
+    assert (
+        "too short for source.rate_hz = 3: it must be at least 666.667, the time of 2 frames" in capsys.readouterr().err
+    )
 
 
 def test_a_scene_with_nothing_to_examine_is_bad(tmp_path: Path, capsys: Output) -> None:

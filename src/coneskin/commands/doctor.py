@@ -97,6 +97,7 @@ def _check(scene: Scene, as_json: bool) -> int:
     from coneskin.scene.build import place_on_arm
     from coneskin.scene.summary import missing_parts, summarize
     from coneskin.scene.suspicions import suspicions
+    from coneskin.skin.sources.kinds import is_simulated
 
     if any(link.mesh for link in scene.links):
         place_on_arm(scene)  # reads them, as a guard would
@@ -108,7 +109,8 @@ def _check(scene: Scene, as_json: bool) -> int:
         width = max(map(len, found))
         print("\n".join(f"{key:<{width}}  {value}" for key, value in found.items()))
         if scene.commissioning and not scene.commissioning.valid:
-            print(f"the arm will only stop when it is touched; to let it move away: coneskin commission {scene.name}")
+            named = scene.name + (" --simulated" if scene.source and is_simulated(scene.source.kind) else "")
+            print(f"the arm will only stop when it is touched; to let it move away: coneskin commission {named}")
     for line in doubts:
         print(f"warning: {line}", file=sys.stderr)
     for line in missing:
@@ -145,11 +147,13 @@ def _offer_patch(args: argparse.Namespace, scene: Scene, doctor: Doctor) -> None
 
 
 def _say_next(args: argparse.Namespace, scene: Scene, code: int) -> None:
+    from coneskin.scene.build import withheld_motion
+
     name = shlex.quote(str(args.scene)) + (" --simulated" if args.simulated else "")
     if code:
         measured = f" --measured {shlex.quote(str(args.measured))}" if args.measured else ""
         print_hint(f"next: mend what is bad, then coneskin doctor {name}{measured}")
-    elif scene.moves_away:
+    elif withheld_motion(scene):
         print_hint(f"next: coneskin commission {name}")
     else:
         alone = scene.arm is None  # `guard --simulated` simulates an arm: a virtual skin alone needs no option

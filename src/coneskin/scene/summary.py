@@ -30,10 +30,18 @@ _BARE_WORDS = {
 }
 
 
+_FEWEST_FRAMES = 2  # for which a skin may be silent; with less each frame would be late
+
+
 def missing_parts(scene: Scene) -> list[str]:
     """Return what has to be added before the scene can be guarded, one line each."""
     needed = {"[source]": scene.source, "[[link]] with a [[link.sensor]]": scene.sensors}
     lines = [f"a guard needs a {name}" for name, part in needed.items() if not part]
+    rate, silence = scene.source.settings.get("rate") if scene.source else None, scene.monitoring_limits.skin_silence
+    if rate is not None and silence * rate < _FEWEST_FRAMES:
+        least = 1e3 * _FEWEST_FRAMES / rate
+        said = f"monitoring.skin_silence_ms = {1e3 * silence:g} is too short for source.rate_hz = {rate:g}"
+        lines.append(f"{said}: it must be at least {least:g}, the time of {_FEWEST_FRAMES} frames")
     return lines + (_missing_tiers(scene, scene.arm) if scene.arm else [])
 
 
