@@ -85,11 +85,11 @@ def test_each_bench_can_be_imported_and_has_a_main() -> None:
 
 @pytest.mark.promise("P38")
 @pytest.mark.long
-def test_an_arm_that_gives_way_to_a_firm_push_meets_a_wall_behind_its_wrist_slowly() -> None:
-    """28 N at 18 mm/s: a hard body takes 3.6 N more each ms, and the joints show it after some."""
+def test_an_arm_that_gives_way_to_a_firm_push_leads_with_no_bare_wrist() -> None:
+    """With 28 N at 18 mm/s, a wall behind the wrist bore up to 20 N before the joints showed it."""
     pytest.importorskip("mujoco", reason="the physics engine is MuJoCo (PyPI: mujoco)")
     words = [sys.executable, "-m", "bench", "bare-sides", "--case", "2", "--way", "comply"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
     (force,) = re.findall(r"forces=\([\d.]+, ([\d.]+)\)", done.stdout)
-    assert "something resists it" in done.stdout
-    assert 5.0 < float(force) < 20.0
+    assert "no skin covers the wrist 2, which would lead" in done.stdout
+    assert float(force) == 0.0

@@ -1,6 +1,6 @@
 """What a reaction presses where no skin sees: bodies behind bare strips, at the elbow and the wrists, and thumbs.
 
-    python -m bench bare-sides [--collisions 2000] [--parallel 2] [--keep FILE] [--bare-side allowed|stop] [--json]
+    python -m bench bare-sides [--collisions 2000] [--parallel 2] [--keep FILE] [--bare-side allowed|stop|fast] [--json]
     python -m bench bare-sides --case 123 --way comply
 
 An arm with a skin of wrap 300 on one tube, in the physics engine. In every other turn it stands, else it runs into what
@@ -269,7 +269,7 @@ def main() -> int:
     parser.add_argument("--from", type=int, default=0, dest="first", help="first seed (%(default)s)")
     parser.add_argument("--parallel", type=int, default=1)
     parser.add_argument("--keep", type=Path, metavar="FILE", help="add each outcome to this file; go on from it")
-    parser.add_argument("--bare-side", default="allowed", choices=("allowed", "stop"))
+    parser.add_argument("--bare-side", default="allowed", choices=("allowed", "stop", "fast"))
     parser.add_argument("--most-n", type=float, default=20.0)
     parser.add_argument("--most-mm", type=float, default=2.0)
     parser.add_argument("--case", type=int, metavar="SEED", help="show one case")
