@@ -48,7 +48,7 @@ def show_kinds(lines: list[dict[str, Any]], parallel: int, slack_ms: float) -> N
     show("s from the fault to standstill; pushed: mm towards a touch beyond a bare stop, the worst", columns, rows)
     for line in lines:
         if line["repeated"]:
-            words = "failed trials: the machine held up the virtual skin, or the campaign"
+            words = "failed trials: the machine held them up, or nothing moved that a fault could stop"
             print(f"{line['kind']}: repeated {line['repeated']} {words}")
         for failure in line["failures"][:5]:
             print(f"{line['kind']}: FAILED: {failure}")

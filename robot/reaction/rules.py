@@ -10,8 +10,6 @@ from coneskin.core.errors import RobotRefused
 
 from .types import KINDS, Reaction
 
-_MOVING_KINDS = ("comply", "retreat")
-
 
 @dataclass(frozen=True, slots=True)
 class Rule:
@@ -75,7 +73,7 @@ class RuleSet:
     @property
     def move(self) -> bool:
         """True where one of them may move the arm away."""
-        return not self.kinds.isdisjoint(_MOVING_KINDS)
+        return any(reaction.moves for reaction in (self.default, *(rule.reaction for rule in self.rules)))
 
     def without_motion(self) -> RuleSet:
         """Return these rules with a stop, and its deceleration, where one of them moves the arm away."""
@@ -100,4 +98,4 @@ class RuleSet:
 
 
 def _still(reaction: Reaction) -> Reaction:
-    return replace(reaction, kind="stop") if reaction.kind in _MOVING_KINDS else reaction
+    return replace(reaction, kind="stop") if reaction.moves else reaction

@@ -78,7 +78,7 @@ class Reaction:
         arm_distance: that no point of the bare arm goes from where the motion began [m].
         full_level: level at which comply gives way with its full speed.
         bare_side: what a motion away does that would move a surface outward which no skin covers: "stop" does not
-            begin it, "allowed" makes a retreat slowly, "fast" makes it as any other.
+            begin it, "allowed" makes a retreat slowly, "fast" makes it as any other. ``bare_lead`` says which counts.
         slow_to: the controller's speed slider while slow, 0..1.
         slow_speed: of the touched surface, below which an arm counts as slow whatever it was before [m/s].
         press: how far the surface may move into a touch while the arm is slow, the way of a stop included; what
@@ -123,6 +123,16 @@ class Reaction:
             value = getattr(self, name)
             if not (math.isfinite(value) and 0.0 < value <= most):
                 raise RobotRefused(f"reaction {name} must be above 0 and at most {most} {unit}, got {value!r}")
+
+    @property
+    def moves(self) -> bool:
+        """True where it moves the arm away from a touch, or gives way to it."""
+        return self.kind in ("comply", "retreat")
+
+    @property
+    def bare_lead(self) -> str:
+        """Return what counts of ``bare_side``: of comply, whose push a lever makes stronger, no "allowed"."""
+        return "stop" if self.kind == "comply" and self.bare_side == "allowed" else self.bare_side
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,7 +127,7 @@ class ReactionPlanner:
         motion = plan_reaction_motion(self._model, reaction, at_touch, here, contacts, self._workspace)
         if isinstance(motion, str):
             return motion
-        if self._bare is not None and not _may_lead(reaction):
+        if self._bare is not None and reaction.bare_lead == "stop":
             toward: ReactionMotion | str = motion
             if motion.how == "push":
                 away = replace(reaction, kind="retreat")
@@ -154,11 +154,6 @@ class ReactionPlanner:
         if isinstance(step, Done) or self._held_braking is None:
             return reaction
         return replace(reaction, acceleration=min(reaction.acceleration, self._held_braking(here.q, step.qd)))
-
-
-def _may_lead(reaction: Reaction) -> bool:
-    """Tell whether a bare side may lead. Where the arm gives way to a push, only if the scene says nothing is there."""
-    return reaction.bare_side == "fast" or (reaction.bare_side == "allowed" and reaction.kind != "comply")
 
 
 def _bare_way(bare: BareSides, q: Joints, there: Sequence[float], how: str) -> str:
@@ -205,10 +200,9 @@ class MotionStream:
     ) -> None:
         self._motion, self._program, self._torque = motion, program, torque
         self.progress, self.how = 0.0, motion.how
-        self._bare = None if reaction.bare_side == "fast" else bare
-        self._slow_lead = _may_lead(reaction)  # a bare side may lead, slowly
-        leads = self._slow_lead and self._bare is not None
-        self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push", leads)
+        self._bare = None if reaction.bare_lead == "fast" else bare
+        self._slow_lead = self._bare is not None and reaction.bare_lead == "allowed"
+        self._supervision = ContactSupervision(model, here.q, contacts, self.how == "push", self._slow_lead)
         self._resistance = ResistanceMonitor(model, torque, self.how == "push")
         self._start, self._began = here.q, here.time
         self._sent = -math.inf

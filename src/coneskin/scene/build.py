@@ -91,8 +91,7 @@ def withheld_motion(scene: Scene) -> str:
 def bare_parts(scene: Scene) -> str:
     """Return the parts of the arm without a skin, where no reaction may move it if one leads; empty where it may."""
     reactions = scene.default_reaction, *(rule.reaction for rule in scene.rules)
-    kept = {("retreat", "stop"), ("comply", "stop"), ("comply", "allowed")}
-    if scene.arm is None or not kept.intersection((one.kind, one.bare_side) for one in reactions):
+    if scene.arm is None or not any(one.moves and one.bare_lead == "stop" for one in reactions):
         return ""
     from coneskin.robot.reaction.bare_side import BareSides
 

@@ -167,10 +167,10 @@ def _reaction(reaction: Reaction) -> str:
         f"{1e3 * reaction.speed:g} mm/s within {reaction.time_budget:g} s, no point of the arm farther than "
         f"{1e3 * reaction.arm_distance:g} mm or faster than {1e3 * reaction.arm_speed:g} mm/s"
     )
+    text += _BARE_WORDS[reaction.bare_lead]
     if reaction.kind == "retreat":
-        return text + _BARE_WORDS[reaction.bare_side]
-    leads = "fast" if reaction.bare_side == "fast" else "stop"
-    return f"{text}{_BARE_WORDS[leads]}, with full speed at level {reaction.full_level:g} of the touch (0 to 1)"
+        return text
+    return f"{text}, with full speed at level {reaction.full_level:g} of the touch (0 to 1)"
 
 
 def _conditions(rule: Rule) -> str:
