@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-import threading
+import subprocess
+import sys
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -43,31 +44,37 @@ def give_precedence(task: int) -> None:
             Path(f"/proc/{task}/autogroup").write_text("-10")
 
 
+_WATCH = """
+import select, sys, time
+late, before, over = 0.0, time.monotonic(), False
+while not over:
+    over = bool(select.select([sys.stdin], [], [], 0.01)[0])
+    now = time.monotonic()
+    late, before = max(late, now - before - 0.01), now
+print(late)
+"""
+
+
 class MachineWatch:
-    """Watch that sees for how long the machine does not let a process run which only sleeps; used in a ``with``.
+    """Process that only sleeps and sees for how long the machine does not let it run; used in a ``with``.
+
+    A thread of the campaign would wait for the campaign's other threads as well.
 
     Attributes:
-        late: the longest time so far [s].
+        late: the longest time, once it has ended [s].
     """
 
-    def __init__(self) -> None:
-        self.late = 0.0
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="machine watch")
+    late = 0.0
 
     def __enter__(self) -> MachineWatch:
-        self._thread.start()
+        command = [sys.executable, "-I", "-S", "-c", _WATCH]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _watch(self) -> None:
-        before = CLOCK()
-        while not self._over.wait(0.01):
-            now = CLOCK()
-            self.late, before = max(self.late, now - before - 0.01), now
+        self.late = float(self._process.communicate()[0])
 
 
 @dataclass(frozen=True)

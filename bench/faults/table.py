@@ -25,6 +25,7 @@ def summary(kind: FaultKind, control: str, outcomes: list[Outcome], slack: float
         "pushed_in_mm": None if not pushed else round(1e3 * max(pushed), 1),
         "budget": None if kind.before else round(budget_of(kind, slack), 3),
         "repeated": sum(outcome.repeated for outcome in outcomes),
+        "discarded": [line for outcome in outcomes for line in outcome.discarded][:3],
         "held_up": round(max(outcome.held_up for outcome in outcomes), 4),
         "failed": sum(bool(outcome.failures) for outcome in outcomes),
         "failures": list(dict.fromkeys(failures)),
