@@ -107,7 +107,7 @@ def test_all_mistakes_at_once() -> None:
         ({"count": True}, "a whole number from 0 to 10, got True"),
         ({"count": 0x10**5000}, "a whole number from 0 to 10, got something too large to print"),
         ({"word": "c"}, "one of a, b, got 'c'"),
-        ({"word": 5}, "must be text, got 5"),
+        ({"word": 5}, "one of a, b, got 5"),
         ({"flag": "yes"}, "must be true or false, got 'yes'"),
         ({"place_mm": [1, "x"]}, "thing.place_mm[1] must be a number [mm], got 'x'"),
         ({"place_mm": [1, 11]}, "thing.place_mm[1] must be from -10 to 10 mm, got 11.0 mm"),

@@ -206,7 +206,7 @@ def _convert(key: Key, value: Any, where: str, report: Callable[[str], None]) ->
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             report(f"{where} must be a list of tables, in double brackets, got {_show(value)}")
             return None
-    elif not isinstance(value, key.kind):
+    elif not key.choices and not isinstance(value, key.kind):
         report(f"{where} must be {'text' if key.kind is str else 'true or false'}, got {_show(value)}")
         return None
     if key.choices and value not in key.choices:
