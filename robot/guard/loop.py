@@ -20,7 +20,7 @@ from coneskin.core.channel import Channel, wait_readable
 from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
-from coneskin.robot.driver.liveness import BEAT_PERIOD
+from coneskin.robot.driver.liveness import BEAT_PERIOD, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import EndReaction, Heartbeat, Release, SetJointVelocity, Shutdown, StopProgram
 from coneskin.robot.driver.protocol import (
     HeartbeatWriter,
@@ -81,12 +81,16 @@ class GuardPorts:
 
 
 class _Outbox:
-    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder."""
+    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder.
 
-    __slots__ = ("_clock", "_ports", "events", "sent")
+    Attributes:
+        since: when what it is decided from was read [s].
+    """
+
+    __slots__ = ("_clock", "_ports", "events", "sent", "since")
 
     def __init__(self, ports: GuardPorts, clock: Callable[[], float]) -> None:
-        self._ports, self._clock = ports, clock
+        self._ports, self._clock, self.since = ports, clock, clock()
         self.sent: list[Block] = []  # commands, of the times at which they were sent
         self.events: list[GuardEvent] = []
 
@@ -103,6 +107,8 @@ class _Outbox:
 
     def _send(self, output: Command) -> bool:
         ports = self._ports
+        if _moves(output) and self._clock() - self.since > SETPOINT_SILENCE:
+            return False  # this process was held up meanwhile: the arm was stopped, and nobody looked at its skin
         if isinstance(output, (StopProgram, SetJointVelocity, EndReaction, Release)):  # first the one that is in haste
             channel = ports.driver if ports.watchdog is None else ports.watchdog
             return channel is not None and channel.send(output.encode())
@@ -117,6 +123,12 @@ class _Outbox:
         if isinstance(output, SetpointProgram):
             return isinstance(ports.stops, ProgramStarter) and ports.stops.follow(output)
         return ports.slider is not None and ports.slider.set(output.fraction)
+
+
+def _moves(command: Command) -> bool:
+    """Tell whether a command moves the arm; a setpoint of no motion ends one."""
+    setpoint = isinstance(command, JointVelocitySetpoint) and command.token != 0
+    return setpoint or isinstance(command, (SetJointVelocity, SetpointProgram))
 
 
 #: s for which the guard leaves its processor after a stop: whom it has woken mostly waits for that one
@@ -267,6 +279,7 @@ class GuardLoop:
         ports = self._ports
         before, sleepless_before = self._round
         self._round = now, sleepless = self._clock(), self._sleepless_clock()
+        self._outbox.since = now
         if now - before > MIN_STALL or sleepless - sleepless_before > _SUSPENSION_TIME:
             self._note_overrun(now, now - before, sleepless - sleepless_before)
         stopping, skin = self._core.phase.stopping, ports.source if ready & _SKIN or self._blind else None

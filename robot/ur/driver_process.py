@@ -2,7 +2,8 @@
 
 It has two channels: the guard's, which always comes first, and the program's. After a ``StopProgram`` the program is
 refused until the guard sends ``Release``. When either channel ends, or the guard sends no heartbeat, the arm is
-stopped; when this process ends or hangs, the controller's watchdog stops the arm.
+stopped, and a setpoint that was held up with the guard does not move it again; when this process ends or hangs, the
+controller's watchdog stops the arm.
 
 A request of the program has a number, which its answer repeats, and the time at which it was sent: one that has waited
 for long is void, because the program has given it up. Speeds and servo positions expire: they are not kept for a
@@ -168,6 +169,7 @@ class DriverProcess:
         self._heard = clock()
         self._allowed = False
         self._patience = math.inf  # s for which the guard may be silent; without limit while nothing moves
+        self._forbidden = False  # the guard fell silent or a stop failed: no setpoint counts until it stops the arm
         self._waiting: list[int] = []  # numbers of the requests whose end the program waits for
         self._expires = math.inf  # when the speeds or positions of the program are void
         self._request_lifetime = request_lifetime
@@ -241,26 +243,26 @@ class DriverProcess:
         try:
             match command:
                 case StopProgram(deceleration) | EndReaction(deceleration):
-                    self._allowed, self._patience = False, math.inf
+                    self._allowed, self._patience, self._forbidden = False, math.inf, False
                     self._deceleration = deceleration
                     self._answer_waiting(ok=False, stopped=True, why="the guard has stopped the arm")
                     self._stop(deceleration)
                     self._guard.send(StatusReport("done").encode())
-                case SetJointVelocity(qd, acceleration):
+                case SetJointVelocity(qd, acceleration) if not self._forbidden:
                     self._allowed, self._patience, self._expires = False, SETPOINT_SILENCE, math.inf
                     self._arm.speed("speed_j", qd, acceleration)
                 case Release(number):
                     self._work(_START_TIMEOUT)
                     self._arm.revive()
                     self._arm.arriving = False
-                    self._allowed, self._patience = True, GUARD_SILENCE
+                    self._allowed, self._patience, self._forbidden = True, GUARD_SILENCE, False
                     self._guard.send(StatusReport("released", str(number)).encode())
         except ConeSkinError as exc:
             self._guard.send(StatusReport("error", str(exc)).encode())
 
     def _forbid(self, why: str) -> None:
         """Stop the arm because the guard itself, or a stop, has failed."""
-        self._allowed, self._patience = False, math.inf
+        self._allowed, self._patience, self._forbidden = False, math.inf, True
         self._answer_waiting(ok=False, stopped=True, why=why)
         self._guard.send(StatusReport("error", why).encode())
         self._try_to_stop()

@@ -101,6 +101,11 @@ def test_without_one_who_listens_the_arm_moves_on(
     assert breaks in explore(world, stop_at_first=True).broken
 
 
+def test_a_setpoint_that_outlives_the_silence_of_its_guard_moves_a_latched_arm() -> None:
+    world = ProcessWorld("internal", Parts(setpoint=math.inf), most_wrong=1)
+    assert "released" in explore(world, stop_at_first=True).broken
+
+
 @pytest.mark.pure
 @pytest.mark.parametrize("name", INVARIANTS)
 def test_each_invariant_that_is_broken_on_purpose_is_found(name: str) -> None:

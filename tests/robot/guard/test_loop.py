@@ -10,6 +10,7 @@ import pytest
 from coneskin.core.channel import Channel, pair
 from coneskin.core.errors import SkinConnectionError
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
+from coneskin.robot.driver.messages import EndReaction, SetJointVelocity, StopProgram
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard import loop as module
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts, _Outbox
@@ -237,6 +238,34 @@ def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
     names = [block.payload.partition(b"\n")[0].decode() for block in outbox.sent]
     assert names == ["command", "slider", "setpoint", "follow", "slider"]
     assert {block.time for block in outbox.sent} == {1.0}  # when it was sent, and not when its input came
+
+
+@pytest.mark.promise("P43")
+@pytest.mark.parametrize(("held_up", "sent"), [(0.09, True), (0.11, False)])
+def test_a_guard_that_was_held_up_between_a_decision_and_its_command_moves_nothing(ends, held_up, sent):
+    now = [1.0]
+    taken = dict.fromkeys(("use.return_value", "follow.return_value", "write.return_value"), True)
+    stops, setpoints, driver = Mock(**taken), Mock(**taken), Mock()
+    starter = SimpleNamespace(use=stops.use, follow=stops.follow)
+    outbox = _Outbox(GuardPorts(ends[0], None, driver=driver, stops=starter, setpoints=setpoints), lambda: now[0])
+    now[0] += held_up
+    motions = (
+        SetJointVelocity((0.1,) * 6, 4.0),
+        JointVelocitySetpoint(7, (0.1,) * 6, 4.0),
+        SetpointProgram(7, 9.0, 20.0),
+    )
+    for motion in motions:
+        outbox.append(motion)
+    calls = driver.send.mock_calls + setpoints.mock_calls + stops.mock_calls
+    assert calls == ([call(motions[0].encode()), call.write(motions[1]), call.follow(motions[2])] if sent else [])
+    ends_motion, stop_path = JointVelocitySetpoint(0, (0.0,) * 6, 0.0), UseStopPath(StopPath.COMMAND, 5.0)
+    for stop in (StopProgram(10.0), EndReaction(10.0), stop_path, ends_motion):
+        outbox.append(stop)  # however late
+    assert driver.send.mock_calls[-2:] == [call(StopProgram(10.0).encode()), call(EndReaction(10.0).encode())]
+    assert (setpoints.mock_calls[-1], stops.mock_calls[-1]) == (
+        call.write(ends_motion),
+        call.use(StopPath.COMMAND, 5.0),
+    )
 
 
 def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):

@@ -239,6 +239,25 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
     assert stops(made.control)[before:] == ["speedStop"]
 
 
+@pytest.mark.promise("P43")
+def test_a_setpoint_that_was_held_up_with_the_guard_does_not_move_an_arm_that_was_stopped_for_it(driver, now):
+    served, made, guard, _ = driver
+    setpoint = SetJointVelocity((0.1,) * 6, 4.0)
+    for message in (Release(7), StopProgram(10.0), setpoint):
+        guard.send(message.encode())
+    served.poll(0.0)
+    now[0] += SETPOINT_SILENCE + 0.01
+    served.poll(0.0)
+    sent = len(made.control.calls)
+    guard.send(setpoint.encode())  # the guard runs again, and sends what it had begun
+    served.poll(0.0)
+    assert "speedJ" not in [call[0] for call in made.control.calls[sent:]]
+    guard.send(StopProgram(10.0).encode())  # it has seen what happened
+    guard.send(setpoint.encode())
+    served.poll(0.0)
+    assert "speedJ" in [call[0] for call in made.control.calls[sent:]]
+
+
 def test_a_sign_of_life_is_no_new_speed(driver, now):
     served, made, guard, _ = driver
     for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0)):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
-from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, UNGUARDED_TIME
+from coneskin.robot.driver.liveness import GUARD_SILENCE, HOLD_UP_LIMIT, SETPOINT_SILENCE, UNGUARDED_TIME
 from coneskin.robot.stop.limits import MonitoringLimits
 
 _TICK = 0.05  # s; no limit is finer
@@ -44,6 +44,7 @@ class Parts:
         hold_up: the same, where this computer lets it wait for a processor [s].
         guard_silence: of the guard, as its helper hears it [s].
         second_silence: the same, as the second watchdog hears it, with external control [s].
+        setpoint: for which one that was held up with the guard moves the arm [s]; then the driver process takes none.
         watchdog: after which the controller ends a program that hears nothing [s]: with internal control that of the
             driver process, with external control one with the lines of ``coneskin heartbeat``.
         watchdog_period: 1 / ``watchdog_hz`` of the scene, which that is meant to be [s].
@@ -54,6 +55,7 @@ class Parts:
     guard_silence: float = GUARD_SILENCE
     hold_up: float = HOLD_UP_LIMIT
     second_silence: float = UNGUARDED_TIME
+    setpoint: float = SETPOINT_SILENCE
     watchdog: float = 0.25
     watchdog_period: float = 0.25
 
@@ -93,6 +95,7 @@ class _State(NamedTuple):  # a tuple, since it is compared and hashed a million 
     guard_age: int = 0  # as the helper hears it
     second_age: int = 0  # as the second watchdog hears the guard
     kick_age: int = 0  # as the controller hears the driver process, or the guard's count
+    began: bool = False  # the guard was frozen while it moved the arm away, with a setpoint that it had begun to send
     wrong_for: int = 0  # ticks that the arm has moved since the newest thing went wrong
     lost: int = 0  # beats in a row that were lost
 
@@ -167,11 +170,16 @@ class ProcessWorld:
         before, broken = self.state, list[str]()
         match action.split():
             case ["freeze", name]:
-                self.state = before._replace(**{name: _FROZEN}, wrong_for=0)
+                began = self.control == "internal" and before.moves and not before.latched
+                self.state = before._replace(
+                    **{name: _FROZEN}, began=began if name == "guard" else before.began, wrong_for=0
+                )
             case ["hold", name]:
                 self.state = before._replace(**{name: _HELD_UP}, wrong_for=0)
             case ["kill", name]:
                 self.state = before._replace(**{name: _DEAD}, wrong_for=0)
+            case ["thaw", "guard"]:
+                broken = self._thaw_guard()
             case ["thaw", name]:
                 self.state = before._replace(**{name: _ALIVE}, wrong_for=0)
             case ["restart"]:  # the program ends, its processes with it, and a new one begins with a guard that waits
@@ -185,6 +193,14 @@ class ProcessWorld:
             case ["tick"] | ["lose", *_]:
                 broken = self._tick(lost=action != "tick")
         return broken
+
+    def _thaw_guard(self) -> list[str]:
+        """Let the guard go on, which first sends what it had begun to; a driver process that ended takes nothing."""
+        state = self.state
+        heard = state.began and state.program != _DEAD and state.helper == _ALIVE and not state.cut
+        follows = heard and state.guard_age <= _ticks(self.parts.setpoint)
+        self.state = state._replace(guard=_ALIVE, began=False, moves=state.moves or follows, wrong_for=0)
+        return ["released: a setpoint that was held up moves the arm"] if follows and not state.moves else []
 
     def _reset(self) -> None:
         """Forgive a stop: the guard lives, nothing stands against it, and the helper acknowledges."""
