@@ -81,16 +81,12 @@ class GuardPorts:
 
 
 class _Outbox:
-    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder.
-
-    Attributes:
-        since: when what it is decided from was read [s].
-    """
+    """Sink that sends a command as soon as the core has decided it, and keeps what to tell the recorder."""
 
     __slots__ = ("_clock", "_ports", "events", "sent", "since")
 
     def __init__(self, ports: GuardPorts, clock: Callable[[], float]) -> None:
-        self._ports, self._clock, self.since = ports, clock, clock()
+        self._ports, self._clock, self.since = ports, clock, clock()  # since: what is decided now was read then [s]
         self.sent: list[Block] = []  # commands, of the times at which they were sent
         self.events: list[GuardEvent] = []
 
@@ -107,7 +103,7 @@ class _Outbox:
 
     def _send(self, output: Command) -> bool:
         ports = self._ports
-        if _moves(output) and self._clock() - self.since > SETPOINT_SILENCE:
+        if isinstance(output, (SetJointVelocity, SetpointProgram)) and self._clock() - self.since > SETPOINT_SILENCE:
             return False  # this process was held up meanwhile: the arm was stopped, and nobody looked at its skin
         if isinstance(output, (StopProgram, SetJointVelocity, EndReaction, Release)):  # first the one that is in haste
             channel = ports.driver if ports.watchdog is None else ports.watchdog
@@ -123,12 +119,6 @@ class _Outbox:
         if isinstance(output, SetpointProgram):
             return isinstance(ports.stops, ProgramStarter) and ports.stops.follow(output)
         return ports.slider is not None and ports.slider.set(output.fraction)
-
-
-def _moves(command: Command) -> bool:
-    """Tell whether a command moves the arm; a setpoint of no motion ends one."""
-    setpoint = isinstance(command, JointVelocitySetpoint) and command.token != 0
-    return setpoint or isinstance(command, (SetJointVelocity, SetpointProgram))
 
 
 #: s for which the guard leaves its processor after a stop: whom it has woken mostly waits for that one

@@ -2,8 +2,7 @@
 
 It has two channels: the guard's, which always comes first, and the program's. After a ``StopProgram`` the program is
 refused until the guard sends ``Release``. When either channel ends, or the guard sends no heartbeat, the arm is
-stopped, and a setpoint that was held up with the guard does not move it again; when this process ends or hangs, the
-controller's watchdog stops the arm.
+stopped, whatever setpoint the guard then still sends; when this process hangs, the controller's watchdog stops it.
 
 A request of the program has a number, which its answer repeats, and the time at which it was sent: one that has waited
 for long is void, because the program has given it up. Speeds and servo positions expire: they are not kept for a
@@ -167,9 +166,8 @@ class DriverProcess:
         self._clock, self._on_end, self._work = clock, on_end, work
         self._quit = False
         self._heard = clock()
-        self._allowed = False
+        self._allowed = self._forbidden = False  # forbidden: the guard's setpoints as well, until it stops the arm
         self._patience = math.inf  # s for which the guard may be silent; without limit while nothing moves
-        self._forbidden = False  # the guard fell silent or a stop failed: no setpoint counts until it stops the arm
         self._waiting: list[int] = []  # numbers of the requests whose end the program waits for
         self._expires = math.inf  # when the speeds or positions of the program are void
         self._request_lifetime = request_lifetime

@@ -163,11 +163,10 @@ def _reaction(reaction: Reaction) -> str:
             f"{1e3 * reaction.press:g} mm into the touch; then, or where it would be more, stop, {stop}"
         )
     text = (
-        f"{reaction.kind}: stop, {stop}, then at most {1e3 * reaction.distance:g} mm at up to "
-        f"{1e3 * reaction.speed:g} mm/s within {reaction.time_budget:g} s, no point of the arm farther than "
-        f"{1e3 * reaction.arm_distance:g} mm or faster than {1e3 * reaction.arm_speed:g} mm/s"
+        f"{reaction.kind}: stop, {stop}, then at most {1e3 * reaction.distance:g} mm at up to {1e3 * reaction.speed:g} "
+        f"mm/s within {reaction.time_budget:g} s, no point of the arm farther than {1e3 * reaction.arm_distance:g} mm "
+        f"or faster than {1e3 * reaction.arm_speed:g} mm/s{_BARE_WORDS[reaction.bare_lead]}"
     )
-    text += _BARE_WORDS[reaction.bare_lead]
     if reaction.kind == "retreat":
         return text
     return f"{text}, with full speed at level {reaction.full_level:g} of the touch (0 to 1)"

@@ -249,23 +249,14 @@ def test_a_guard_that_was_held_up_between_a_decision_and_its_command_moves_nothi
     starter = SimpleNamespace(use=stops.use, follow=stops.follow)
     outbox = _Outbox(GuardPorts(ends[0], None, driver=driver, stops=starter, setpoints=setpoints), lambda: now[0])
     now[0] += held_up
-    motions = (
-        SetJointVelocity((0.1,) * 6, 4.0),
-        JointVelocitySetpoint(7, (0.1,) * 6, 4.0),
-        SetpointProgram(7, 9.0, 20.0),
-    )
-    for motion in motions:
-        outbox.append(motion)
-    calls = driver.send.mock_calls + setpoints.mock_calls + stops.mock_calls
-    assert calls == ([call(motions[0].encode()), call.write(motions[1]), call.follow(motions[2])] if sent else [])
-    ends_motion, stop_path = JointVelocitySetpoint(0, (0.0,) * 6, 0.0), UseStopPath(StopPath.COMMAND, 5.0)
-    for stop in (StopProgram(10.0), EndReaction(10.0), stop_path, ends_motion):
-        outbox.append(stop)  # however late
-    assert driver.send.mock_calls[-2:] == [call(StopProgram(10.0).encode()), call(EndReaction(10.0).encode())]
-    assert (setpoints.mock_calls[-1], stops.mock_calls[-1]) == (
-        call.write(ends_motion),
-        call.use(StopPath.COMMAND, 5.0),
-    )
+    qd, stopping, stop_path = (0.1,) * 6, (StopProgram(10.0), EndReaction(10.0)), UseStopPath(StopPath.COMMAND, 5.0)
+    motion, program = SetJointVelocity(qd, 4.0), SetpointProgram(7, 9.0, 20.0)
+    ends_motion = JointVelocitySetpoint(0, qd, 0.0)
+    for command in (motion, program, *stopping, stop_path, ends_motion):  # stops however late
+        outbox.append(command)
+    assert driver.send.mock_calls == [call(one.encode()) for one in (*[motion][:sent], *stopping)]
+    assert setpoints.mock_calls == [call.write(ends_motion)]
+    assert stops.mock_calls == [*[call.follow(program)][:sent], call.use(*stop_path)]
 
 
 def test_the_last_word_is_handed_over_to_a_reader_who_is_slow(ends):
