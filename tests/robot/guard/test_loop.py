@@ -245,16 +245,16 @@ def test_each_command_of_the_guard_s_own_goes_over_its_connection(ends):
 def test_a_guard_that_was_held_up_between_a_decision_and_its_command_moves_nothing(ends, held_up, sent):
     now = [1.0]
     taken = dict.fromkeys(("use.return_value", "follow.return_value", "write.return_value"), True)
-    stops, setpoints, driver = Mock(**taken), Mock(**taken), Mock()
+    (driver, driver_end), stops, setpoints = ends, Mock(**taken), Mock(**taken)
     starter = SimpleNamespace(use=stops.use, follow=stops.follow)
-    outbox = _Outbox(GuardPorts(ends[0], None, driver=driver, stops=starter, setpoints=setpoints), lambda: now[0])
+    outbox = _Outbox(GuardPorts(driver, None, driver=driver, stops=starter, setpoints=setpoints), lambda: now[0])
     now[0] += held_up
     qd, stopping, stop_path = (0.1,) * 6, (StopProgram(10.0), EndReaction(10.0)), UseStopPath(StopPath.COMMAND, 5.0)
     motion, program = SetJointVelocity(qd, 4.0), SetpointProgram(7, 9.0, 20.0)
     ends_motion = JointVelocitySetpoint(0, qd, 0.0)
     for command in (motion, program, *stopping, stop_path, ends_motion):  # stops however late
         outbox.append(command)
-    assert driver.send.mock_calls == [call(one.encode()) for one in (*[motion][:sent], *stopping)]
+    assert driver_end.receive() == [one.encode() for one in (*[motion][:sent], *stopping)]
     assert setpoints.mock_calls == [call.write(ends_motion)]
     assert stops.mock_calls == [*[call.follow(program)][:sent], call.use(*stop_path)]
 
