@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError
 
 from .frustum import Frustum
+from .mesh import MAX_LENGTH
 from .pose import Pose, Vector
 
 if TYPE_CHECKING:
@@ -170,3 +171,20 @@ def double_cone(
     first = Frustum(radius1, belt_radius, height1, wrap)
     second = Frustum(belt_radius, radius2, height2, wrap)
     return PlacedFrustum(first), PlacedFrustum(second, Pose(translation=(0.0, 0.0, height1)))
+
+
+def check_place(place: object) -> None:
+    """Refuse what is no place of a sheet on a link.
+
+    Raises:
+        GeometryError: it is no ``PlacedFrustum``, or larger than any link, as where millimeters were meant.
+    """
+    if not isinstance(place, PlacedFrustum):
+        raise GeometryError(f"a place must be a PlacedFrustum, got {place!r}: give the pose of each Frustum")
+    for name in ("radius1", "radius2", "height"):
+        value = getattr(place.frustum, name)
+        if value > MAX_LENGTH:
+            raise GeometryError(
+                f"{name} must be at most {MAX_LENGTH:g} m, got {value:g} m: lengths are in meters, "
+                f"{value:g} mm is {1e-3 * value:g}"
+            )

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -136,6 +137,8 @@ def test_a_mesh_on_which_nothing_fits_is_refused_with_the_search(monkeypatch: py
 @pytest.mark.parametrize(
     ("link", "named", "said"),
     [
+        (None, {}, "the link must be a mesh file, a Mesh, a Frustum or places, got None"),
+        (cs.Frustum(0.05, 0.05, 0.2), {"wrap": 3.0}, "wrap is an option of the search in a mesh, and this link has"),
         (cs.Frustum(0.05, 0.05, 0.2), {"foo": 1}, "foo is no option of the search for sheets; known: allow_hull, "),
         (cs.Frustum(0.05, 0.05, 0.2), {"max_sheet": 1}, "did you mean max_sheets?"),
         (cs.Frustum(54, 70, 150), {}, "radius1 must be at most 5 m, got 54 m: lengths are in meters, 54 mm is 0.054"),
@@ -147,3 +150,9 @@ def test_what_no_link_can_be_is_refused(link: object, named: dict[str, object], 
     with pytest.raises(GeometryError) as raised:
         cs.design_link(link, **named)  # type: ignore[arg-type]
     assert said in str(raised.value)
+
+
+@pytest.mark.parametrize("places", ["link.stl", [cs.Frustum(0.05, 0.05, 0.2)]])
+def test_places_that_are_none_are_refused(places: Any) -> None:
+    with pytest.raises(GeometryError, match="a place must be a PlacedFrustum, got "):
+        cs.design_sheets(places)

@@ -16,7 +16,7 @@ from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.drawing.electrode_layout import NARROWEST_PLAN
 from coneskin.geometry.fit.fit_options import check_names
 from coneskin.geometry.frustum import Frustum
-from coneskin.geometry.mesh import MAX_LENGTH, Mesh, load_mesh, terms_of
+from coneskin.geometry.mesh import Mesh, load_mesh, terms_of
 from coneskin.geometry.placed_frustum import PlacedFrustum
 from coneskin.geometry.solid import require_step_writer
 
@@ -288,19 +288,6 @@ class LinkDesign:
         return html_card(f"design of {self.name}", rows, step, f"{style}<div class='coneskin-flat'>{drawn}</div>")
 
 
-def _check_size(place: PlacedFrustum) -> None:
-    """Refuse a side that is larger than any link, as where millimeters were meant."""
-    if not isinstance(place, PlacedFrustum):
-        raise GeometryError(f"a place must be a PlacedFrustum, got {place!r}: give the pose of each Frustum")
-    for name in ("radius1", "radius2", "height"):
-        value = getattr(place.frustum, name)
-        if value > MAX_LENGTH:
-            raise GeometryError(
-                f"{name} must be at most {MAX_LENGTH:g} m, got {value:g} m: lengths are in meters, "
-                f"{value:g} mm is {1e-3 * value:g}"
-            )
-
-
 def design_link(
     link: str | Path | Mesh | Frustum | Sequence[PlacedFrustum],
     folder: str | Path | None = None,
@@ -351,6 +338,8 @@ def design_link(
 
     options = options or DesignOptions()
     check_names(search, ("round_only",))
+    if search and not isinstance(link, str | Path | Mesh):
+        raise GeometryError(f"{next(iter(search))} is an option of the search in a mesh, and this link has no mesh")
     search = room_for(options) | search
     source: LinkMesh | None = None
     fit: LinkFit | None = None
@@ -362,10 +351,10 @@ def design_link(
     elif isinstance(link, str | Path | Mesh):
         origin = "" if isinstance(link, Mesh) else str(link)
         source, fit = _fit_link(link if isinstance(link, Mesh) else origin, unit, packages, say, arguments, **search)
-    else:
+    elif isinstance(link, Sequence):
         places = link
-    for place in places:
-        _check_size(place)
+    else:
+        raise GeometryError(f"the link must be a mesh file, a Mesh, a Frustum or places, got {link!r}")
     if source is not None:
         if fit is not None and not fit.sheets:
             raise NothingFits(source.mesh.source, fit)

@@ -28,7 +28,7 @@ from coneskin.geometry.drawing.layer_stack import PAPER_STACK, LayerStack
 from coneskin.geometry.drawing.surface_shape import SheetSide
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.placed_frustum import PlacedFrustum
+from coneskin.geometry.placed_frustum import PlacedFrustum, check_place
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.scene.tables.sensor_tables import with_key_names
 from coneskin.skin.electronics import Electronics, GivenElectronics, match_electronics
@@ -267,6 +267,8 @@ def design_assembly(
     if not links:
         why = "no place was given" if isinstance(places, Sequence) else places.reason
         raise GeometryError(f"there is no sheet to design: {why}")
+    for place in links:
+        check_place(place)
     if not isinstance(places, Sequence):
         links = [_straightened(link, _STRAIGHT_SHARE * places.tolerance) for link in links]
     if not (math.isfinite(options.sheet_gap) and options.sheet_gap >= 0.0):
