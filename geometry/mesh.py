@@ -21,6 +21,7 @@ from coneskin.core.arrays import Bools, Floats, Ints, frozen
 from coneskin.core.errors import MeshError, MissingExtra
 from coneskin.core.files import explain_os_error, read_file
 
+from .placed_frustum import MAX_LENGTH
 from .pose import Pose
 
 
@@ -65,7 +66,6 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}  #: metres in one un
 SUFFIXES = (".stl", ".obj", ".dae", ".ply")
 MAX_SIZE = 100_000_000  # bytes of a file; 2 million triangles, and a link is modelled with 10 000
 MIN_LENGTH = 0.005  # m; a shorter mesh is in another unit
-MAX_LENGTH = 5.0  # m; a longer mesh is in another unit
 MIN_THICKNESS = 0.0005  # m; a thinner mesh is a flat drawing
 _RESTRICTED_MODELS = re.compile(r"ur(20|30)(?!\d)", re.IGNORECASE)
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from coneskin.core.errors import GeometryError
 
 from .frustum import Frustum
-from .mesh import MAX_LENGTH
 from .pose import Pose, Vector
 
 if TYPE_CHECKING:
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
     from .bend import Bend
 
+MAX_LENGTH = 5.0  # m; what is longer is no link, or in another unit
 _STRAIGHT_DISTANCE = 1e-6  # m
 
 
@@ -184,7 +184,5 @@ def check_place(place: object) -> None:
     for name in ("radius1", "radius2", "height"):
         value = getattr(place.frustum, name)
         if value > MAX_LENGTH:
-            raise GeometryError(
-                f"{name} must be at most {MAX_LENGTH:g} m, got {value:g} m: lengths are in meters, "
-                f"{value:g} mm is {1e-3 * value:g}"
-            )
+            what = f"got {value:g} m: lengths are in meters, {value:g} mm is {1e-3 * value:g}"
+            raise GeometryError(f"{name} must be at most {MAX_LENGTH:g} m, {what}")

@@ -85,7 +85,10 @@ class ArmMotion:
                 while not self._over.is_set():
                     if select.select([reader], [], [], 0.1)[0]:
                         now = time.monotonic()
-                        self.states += [UR_DRIVER.decode_state(now, payload) for payload in reader.read()]
+                        states = [UR_DRIVER.decode_state(now, payload) for payload in reader.read()]
+                        # of states that are read at once all but the last had come before, by the controller's clock
+                        ages = [states[-1].controller_time - state.controller_time for state in states]
+                        self.states += [state._replace(time=now - age) for state, age in zip(states, ages, strict=True)]
 
         self._thread = threading.Thread(target=read, name="arm motion")
         self._thread.start()

@@ -338,33 +338,28 @@ def design_link(
 
     options = options or DesignOptions()
     check_names(search, ("round_only",))
-    if search and not isinstance(link, str | Path | Mesh):
-        raise GeometryError(f"{next(iter(search))} is an option of the search in a mesh, and this link has no mesh")
-    search = room_for(options) | search
-    source: LinkMesh | None = None
     fit: LinkFit | None = None
     name, frame, origin = "a link by its dimensions", "the axis of the link (z from end 1, x at phi = 0)", ""
     notes: tuple[str, ...] = ()
     places: Sequence[PlacedFrustum] = ()
-    if isinstance(link, Frustum):
-        places = (PlacedFrustum(link),)
-    elif isinstance(link, str | Path | Mesh):
+    mesh: Mesh | None = None
+    if isinstance(link, str | Path | Mesh):
         origin = "" if isinstance(link, Mesh) else str(link)
+        search = room_for(options) | search
         source, fit = _fit_link(link if isinstance(link, Mesh) else origin, unit, packages, say, arguments, **search)
-    elif isinstance(link, Sequence):
-        places = link
-    else:
-        raise GeometryError(f"the link must be a mesh file, a Mesh, a Frustum or places, got {link!r}")
-    if source is not None:
         if fit is not None and not fit.sheets:
             raise NothingFits(source.mesh.source, fit)
-        name, frame, notes = source.name, source.frame, source.notes
+        mesh, name, frame, notes = source.mesh, source.name, source.frame, source.notes
         # a unit that was guessed wrongly should be seen before anything is cut
         for note in (note for note in notes if note not in said):
             progress(f"note: {note}")
-    if source is not None and not options.link:
-        options = dataclasses.replace(options, link=source.name)
-    mesh = None if source is None else source.mesh
+        options = options if options.link else dataclasses.replace(options, link=name)
+    elif search:
+        raise GeometryError(f"{next(iter(search))} is an option of the search in a mesh, and this link has no mesh")
+    elif isinstance(link, Frustum):
+        places = (PlacedFrustum(link),)
+    else:
+        places = link
     if fit is None:
         sheets = design_sheets(places, options)
     else:

@@ -262,11 +262,12 @@ def design_assembly(
         GeometryError: there is no place, or a value is out of range; the message names the sheet.
     """
     options = options or DesignOptions()
+    if not (isinstance(places, Sequence) or hasattr(places, "sheets")):
+        raise GeometryError(f"the link must be a mesh file, a Mesh, a Frustum or places, got {places!r}")
     fits: Sequence[FittedSheet] = () if isinstance(places, Sequence) else places.sheets
     links = places if isinstance(places, Sequence) else [sheet.placed for sheet in fits]
     if not links:
-        why = "no place was given" if isinstance(places, Sequence) else places.reason
-        raise GeometryError(f"there is no sheet to design: {why}")
+        raise GeometryError(f"there is no sheet to design: {getattr(places, 'reason', 'no place was given')}")
     for place in links:
         check_place(place)
     if not isinstance(places, Sequence):
@@ -284,13 +285,12 @@ def design_assembly(
             opened.append(_seam_opened(link, options.seam_gap))
         except GeometryError as exc:
             raise GeometryError(f"sheet {number}: {exc}") from exc
-    stack = options.stack
     placed, refused = assemble(
         opened,
         options.plan,
         options.wires,
-        thickness=stack.thickness,
-        tab_height=stack.middle(_LOWER_CONDUCTIVE),
+        thickness=options.stack.thickness,
+        tab_height=options.stack.middle(_LOWER_CONDUCTIVE),
         gap=options.sheet_gap,
         connector=options.connector,
         rays=None if mesh is None else RayCaster(mesh),
@@ -480,9 +480,7 @@ def _strip_place(design: SheetDesign) -> tuple[PlacedFrustum, float]:
     stack, side = design.options.stack, design.place.frustum
     plan = design.layout.plan
     if plan.wires.startswith("edge"):
-        raise GeometryError(
-            f"{design.name}: its wires leave at the seam, where its strip lies: let them leave at an end"
-        )
+        raise GeometryError(f"{design.name}: its wires leave at the seam, under its strip: let them leave at an end")
     above = design.place.parallel(stack.thickness)
     outer = above.frustum
     trial = Frustum(outer.radius1, outer.radius2, outer.height, 0.5 * math.tau)
