@@ -16,7 +16,7 @@ from coneskin.cli import main
 from coneskin.core.errors import GeometryError, MeshError
 from coneskin.design import pictures
 from coneskin.design.first_scene import _virtual, read_designs
-from coneskin.design.robot_design import _outside, _renumbered, design_robot
+from coneskin.design.robot_design import _outside, _renumbered, _swept, design_robot
 from coneskin.design.sheets.cable_way import SheetBody
 from coneskin.design.sheets.sheet_design import DesignOptions, design_sheets
 from coneskin.geometry.frustum import Frustum
@@ -157,3 +157,23 @@ def test_the_outer_face_of_a_sheet_is_sampled_as_densely_as_a_link() -> None:
     assert np.hypot(*points[:, :2].T) == pytest.approx(0.05 + sheet.options.stack.thickness, abs=1e-9)
     apart = cKDTree(points).query(points, 2)[0][:, 1]
     assert apart.max() <= 2.0 * 1.5e-3 * (1.0 + sheet.options.stack.thickness / 0.05)
+
+
+@pytest.mark.parametrize("ends", [(-0.3, 0.9), (0.5, 0.5), (-2.9, 2.9), (-4.0, 4.0)])
+def test_a_swept_space_is_that_of_its_points_at_every_angle(ends: tuple[float, float]) -> None:
+    """A place that is near some point at some angle is always met, one that is near none at any angle never is."""
+    rng = np.random.default_rng(3)
+    axis = Pose.from_xyz_rpy((0.1, -0.2, 0.3), (0.4, 1.0, -0.7))
+    radius = 0.02 + 0.04 * rng.random(4000)
+    azimuth = 0.3 * rng.random(4000) + np.where(radius < 0.04, math.pi, 0.0)  # its two halves lie opposite each other
+    points = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), 0.05 * rng.random(4000)], axis=1)
+    asked = 0.2 * rng.random((600, 3)) - 0.1
+    away = np.full(600, np.inf)
+    for angle in np.linspace(*ends, 120):
+        turned = Pose.from_xyz_rpy((0.0, 0.0, 0.0), (0.0, 0.0, angle)).apply_all(points)
+        away = np.minimum(away, cKDTree(turned).query(asked)[0])
+    space = _swept(axis, points, *ends)
+    for distance in (0.0, 0.002, 0.012):
+        near = space.near(axis.apply_all(asked), distance)
+        assert near[away < distance].all()
+        assert not near[away > distance + 0.004].any()

@@ -14,14 +14,12 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from coneskin.core.arrays import Bools, Floats
+from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.side import longest_run
@@ -35,13 +33,14 @@ from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_link
 from .folder import DESIGN_FILE, FileOptions, _Draft, _measured, _nested, _new_folder, check_target
 from .link_design import LinkDesign, _fit_link, as_built, room_for
 from .report import _table
+from .sheets.cable_way import SphereBody
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
 
 _WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another
 _SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
-_SWEEP_NEIGHBORS = 24  # samples near a place in its section through the axis, of which one must come by it
+_SWEEP_CELL = 1.5e-3  # m; along, away from and around the axis
 _SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
 _SWEEP_ROW = 2e-3  # m; along a sheet
 _LEAST_SLANT = 0.03  # m; a shorter rest of a sheet is not offered
@@ -78,48 +77,32 @@ class RobotDesign:
     reasons: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _SweptLink:
-    """The space that a link takes over the range of the joint between it and the next, in the frame of that next one.
+def _swept(axis: Pose, points: Floats, lower: float, upper: float) -> SphereBody:
+    """Return the space that a link takes while a joint turns over its range.
 
-    Attributes:
+    Args:
         axis: pose of the joint, whose axis is z.
-        places: distance from the axis, height and azimuth of samples of the link [m, m, rad], shape (n, 3).
+        points: of the link in that frame [m], shape (n, 3).
         lower: least angle by which they are turned [rad].
         upper: largest angle [rad].
     """
-
-    axis: Pose
-    places: Floats
-    lower: float
-    upper: float
-
-    @cached_property
-    def _tree(self) -> cKDTree:
-        return cKDTree(self.places[:, :2])
-
-    def near(self, points: Floats, distance: float) -> Bools:
-        """Return whether each point, shape (n, 3) [m], is nearer to the space than a distance [m]."""
-        radius, height, azimuth = _about(self.axis, points).T
-        reach = distance + _SAMPLE_RADIUS
-        apart, number = self._tree.query(
-            np.stack([radius, height], axis=1), _SWEEP_NEIGHBORS, distance_upper_bound=reach
-        )
-        met = np.isfinite(apart)
-        slack = reach / np.maximum(radius, reach)[:, None]
-        turned = azimuth[:, None] - self.places[np.where(met, number, 0), 2] - self.lower + slack
-        return np.asarray((met & (turned % math.tau <= self.upper - self.lower + 2.0 * slack)).any(axis=1))
-
-
-def _about(axis: Pose, points: Floats) -> Floats:
-    """Return distance from an axis, height along it and azimuth of points, shape (n, 3)."""
-    x, y, z = axis.inverse().apply_all(points).T
-    return np.stack([np.hypot(x, y), z, np.arctan2(y, x)], axis=1)
+    away, azimuth = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    cells, number = np.unique(np.round(np.stack([away, points[:, 2]]) / _SWEEP_CELL), axis=1, return_inverse=True)
+    count = math.ceil(math.tau * away.max() / _SWEEP_CELL) + 1
+    turns = math.tau / count * np.arange(count)
+    begins = np.zeros((len(cells[0]), count), bool)
+    begins[number.ravel(), np.round((azimuth + lower) / turns[1]).astype(int) % count] = True
+    ahead = min(count - 1, math.ceil((upper - lower) / turns[1]))  # turns that are taken after each that begins
+    sums = np.cumsum(np.pad(np.hstack([begins[:, count - ahead :], begins]), ((0, 0), (1, 0))), axis=1)
+    cell, turn = np.nonzero(sums[:, ahead + 1 :] > sums[:, :count])
+    radius, height = _SWEEP_CELL * cells[:, cell]
+    swept = np.stack([radius * np.cos(turns[turn]), radius * np.sin(turns[turn]), height], axis=1)
+    return SphereBody(axis.apply_all(swept), _SAMPLE_RADIUS)
 
 
 def _swept_beside(
     link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh], skins: Mapping[str, LinkDesign]
-) -> list[_SweptLink]:
+) -> list[SphereBody]:
     """Return the spaces of the links next to one, and of the sheets that they have already."""
     spaces = []
     for joint in joints:
@@ -133,9 +116,9 @@ def _swept_beside(
         child = Pose.along(joint.axis)
         parent = joint.origin @ child
         if link == joint.parent:
-            spaces.append(_SweptLink(parent, _about(child, points), joint.lower, joint.upper))
+            spaces.append(_swept(parent, child.inverse().apply_all(points), joint.lower, joint.upper))
         else:
-            spaces.append(_SweptLink(child, _about(parent, points), -joint.upper, -joint.lower))
+            spaces.append(_swept(child, parent.inverse().apply_all(points), -joint.upper, -joint.lower))
     return spaces
 
 
@@ -149,7 +132,7 @@ def _outside(sheet: SheetDesign) -> Floats:
 
 
 def _assembled(
-    design: LinkDesign, fits: Mapping[int, FittedSheet], options: DesignOptions, beside: Sequence[_SweptLink]
+    design: LinkDesign, fits: Mapping[int, FittedSheet], options: DesignOptions, beside: Sequence[SphereBody]
 ) -> LinkDesign:
     """Return a link with sheets at some places, by their numbers before, and a note why not for each without room."""
     if design.fit is None or not fits:
@@ -219,7 +202,7 @@ def design_robot(
             found[name] = LinkDesign(name, (), fit, source.mesh, source.frame, source.notes)
         else:
             reasons.append(f"{name} carries none: {fit.reason}")
-    beside: dict[str, list[_SweptLink]] = {}
+    beside: dict[str, list[SphereBody]] = {}
     skins: dict[str, LinkDesign] = {}
     for name, design in found.items():
         beside[name] = _swept_beside(name, joints, meshes, skins)
@@ -285,7 +268,7 @@ def design_robot(
     return result
 
 
-def _clear(fit: FittedSheet, thickness: float, beside: Sequence[_SweptLink]) -> FittedSheet | None:
+def _clear(fit: FittedSheet, thickness: float, beside: Sequence[SphereBody]) -> FittedSheet | None:
     """Return a sheet that ends before what moves beside it; None where too little is left."""
     side = fit.placed.frustum
     u = np.linspace(0.0, side.slant, max(2, math.ceil(side.slant / _SWEEP_ROW)) + 1)

@@ -43,7 +43,7 @@ def guide(design: SheetDesign, figures: BuildFigures, folder: str = ".") -> str:
 def test_without_a_mesh_it_says_how_far_the_active_area_is_from_the_edges_that_are_drawn() -> None:
     design, figures = built(Frustum(0.045, 0.045, 0.15, math.radians(300.0)))
     text = " ".join(sheet_lines(design, figures, "."))
-    away, turned = (float(x) for x in re.findall(r"end 1 is ([\d.]+) mm further .* points ([\d.]+) deg past", text)[0])
+    away, turned = (float(x) for x in re.findall(r"end 1 is at z = ([\d.]+) mm, .* points ([\d.]+) deg past", text)[0])
     pose = tomllib.loads(sensor_toml(design, 0, "any"))
     assert pose["xyz_mm"] == pytest.approx([0.0, 0.0, away], abs=0.05)
     assert pose["rpy_deg"] == pytest.approx([0.0, 0.0, turned], abs=0.05)
@@ -315,8 +315,8 @@ def test_what_a_person_reads_is_what_the_design_says_in_the_units_that_are_print
     assert rows["part 1"] == f"{along}, {1e3 * chord:.1f} mm straight between the corners of end 1"
     assert rows["conductive sheet"] == "2000 ohm per square (part 3), 500 ohm per square (part 5)"
     assert rows["pins"] == f"3 of {1e3 * design.layout.plan.hole:.1f} mm less 0.1 mm"
-    gap = 2.0 * math.pi * 0.15 / CONE.slant * 0.05  # of tape of 50 um around the cone, once for each of three layers
-    assert rows["seam"] == f"opens by {gap:.1f} mm for each layer of tape, at most {3.0 * gap:.1f} mm at part 7"
+    gap = 2.0 * math.pi * 0.15 / CONE.slant * 0.05  # of tape of 50 um around the cone, once for each of five layers
+    assert rows["seam"] == f"opens by {gap:.1f} mm for each layer of tape, at most {5.0 * gap:.1f} mm at part 7"
     beyond = [-1e3 * float(way.surface[index][0]) for index in (way.tie, -1)]
     lies = [f"the {what} lies {u:.1f} mm beyond end 1" for what, u in zip(("tie", "connector"), beyond, strict=True)]
     assert all(said in rows["cable"] for said in lies)
@@ -369,7 +369,7 @@ def test_a_cable_that_leaves_beside_an_end_is_measured_without_a_sign(u: float, 
 def test_a_sheet_without_pins_says_what_stops_a_mirrored_part(hole: float) -> None:
     design, figures = built(CONE, plan=ElectrodePlan(hole=hole))
     text = "\n".join(common_lines([design], [figures]))
-    assert ("The corner beside the lead has no hole: a mirrored part does not fit" in text) == bool(hole)
+    assert ("The corner at the tabs has no hole: a mirrored part does not fit" in text) == bool(hole)
     assert ("sides of one name lie over each other" in text) == (not hole)
 
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -46,14 +46,6 @@ def _ways_around(normals: Floats) -> list[Floats]:
     return [math.cos(turn) * first + math.sin(turn) * second for turn in np.arange(12) * math.tau / 12]
 
 
-class Body(Protocol):
-    """Something in the way of a cable."""
-
-    def near(self, points: Floats, distance: float) -> Bools:
-        """Return whether each point, shape (n, 3) [m], is nearer to the body than a distance [m]."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SheetBody:
     """The space of a sheet above the side that it covers, up to its thickness [m]."""
@@ -74,23 +66,29 @@ class SheetBody:
         return np.asarray(np.sqrt(along**2 + off**2 + beside**2))
 
     def near(self, points: Floats, distance: float) -> Bools:
-        """Return whether each point is at most a distance away [m]."""
+        """Return whether each point, shape (n, 3) [m], is at most a distance away [m]."""
         return np.asarray(self.distances(points) <= distance)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _StrandBody:
-    """Spheres about points: tabs, wires, a cable with its tie and its connector, or samples of another link."""
+@dataclass(frozen=True, eq=False)
+class SphereBody:
+    """Spheres about points: tabs, wires, a cable with its tie and its connector, or the space that a link sweeps."""
 
     points: Floats
     radius: float
 
-    def near(self, points: Floats, distance: float) -> Bools:
-        """Return whether each point is nearer than a distance to a sphere."""
+    @cached_property
+    def _tree(self) -> Any:
         from scipy.spatial import cKDTree
 
-        reach = self.radius + distance
-        return np.asarray(np.isfinite(cKDTree(self.points).query(points, distance_upper_bound=reach)[0]))
+        return cKDTree(self.points)
+
+    def near(self, points: Floats, distance: float) -> Bools:
+        """Return whether each point is nearer than a distance to a sphere."""
+        return np.asarray(np.isfinite(self._tree.query(points, distance_upper_bound=self.radius + distance)[0]))
+
+
+Body = SheetBody | SphereBody  #: something in the way of a cable
 
 
 def tab_foot(layout: SheetLayout, name: str) -> tuple[float, float]:
@@ -161,9 +159,9 @@ class TabApron:
         points, normals = place.place(us.ravel(), phis.ravel())
         return cls(u, phi, points + (height + slope * far)[:, None] * normals, tips, normals, slope)
 
-    def body(self) -> _StrandBody:
+    def body(self) -> SphereBody:
         """Return the space that the tabs take."""
-        return _StrandBody(self.feet, 1.5e-3)
+        return SphereBody(self.feet, 1.5e-3)
 
     def stands_in(self, rays: RayCaster | None) -> bool:
         """Tell whether the link stands out where the tabs leave."""
@@ -234,12 +232,12 @@ class CableWay:
         """Length of the way from the rim to the cable tie [m]."""
         return float(self.lengths[self.tie])
 
-    def body(self) -> _StrandBody:
+    def body(self) -> SphereBody:
         """Return the space of the cable with its tie and its connector."""
         lifted = self.points + CABLE_RADIUS * self.normals
         ends = [self.tie, len(lifted) - 1]
         ring = [lifted[ends] + (MOUNT_REACH - CABLE_RADIUS) * way for way in _ways_around(self.normals[ends])]
-        return _StrandBody(np.concatenate([lifted, *ring]), CABLE_RADIUS)
+        return SphereBody(np.concatenate([lifted, *ring]), CABLE_RADIUS)
 
 
 @dataclass(frozen=True, eq=False)

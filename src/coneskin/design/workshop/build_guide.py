@@ -44,7 +44,7 @@ def _flat_steps(designs: Sequence[SheetDesign]) -> Iterator[str]:
     first = designs[0]
     cuts, kerf, tab = first.cuts, 1e3 * first.options.kerf, first.layout.plan.tab
     yield (
-        "Test each material before any part is cut. The test piece (`cut/0-test-piece`, and on every nested bed) is a "
+        "Test each material before any part is cut. The test piece (`cut/0-test-piece`, and on each first bed) is a "
         f"square of {TEST_SQUARE * 1e3:g} mm with a square hole of {TEST_HOLE * 1e3:g} mm, drawn without a kerf. Foam, "
         "mesh, conductive sheet and foil are cut by a knife: a drag knife, an oscillating knife for foam, or a scalpel "
         "along the printed PDF. Use no laser unless the maker of the material permits it: polyethylene melts and burns "
@@ -82,10 +82,10 @@ def _flat_steps(designs: Sequence[SheetDesign]) -> Iterator[str]:
         "the conductive adhesive towards part 5, and roll them down: B along end 1, A along end 2. *Check* as before."
     )
     yield (
-        "Cover the bare faces of all four foils, leads included, with polyimide tape that stands 1 mm over the foil on "
-        "each side: they will face the other conductive sheet. The *lead* lies where its sheet is cut away: cover its "
-        "adhesive too. Only the tabs stay bare. *Check:* a probe slid along the tape finds no contact with the foil "
-        "below."
+        "Cover the bare faces of all four foils, leads included, with polyimide tape, slit to stand 1 mm over the foil "
+        "on each side: they will face the other conductive sheet. The *lead* lies where its sheet is cut away: cover "
+        "its adhesive too. Only the tabs stay bare. *Check:* a probe slid along the tape finds no contact with the "
+        "foil below."
     )
     yield (
         "Measure with a multimeter, a probe on each tab: *A-B* and *C-D*, each within "
@@ -122,20 +122,21 @@ def _wrap_steps(designs: Sequence[SheetDesign], collars: bool) -> Iterator[str]:
     marks = "the blue outline on part 1"
     yield (
         "Clean *what it lies on* with isopropanol and a cloth that leaves no lint, and let it dry for a minute. Draw "
-        "two lines on it with a soft pencil, by the sheet's *Place* below: where end 1 lies, around it, and where edge "
-        "0 (of a strip: the seam below) lies, along it. *Check:* the sizes around the link there, by tape measure, "
-        "within 1 mm for each 100 mm. If they differ, this is another link than the design's: stop here."
+        "lines on it with a soft pencil, by the sheet's *Place* below: where its ends lie, around it, and where edge 0 "
+        f"{'(of a strip: the seam below) ' if any(design.above for design in designs) else ''}lies, along it. "
+        "*Check:* the sizes around the link there, by tape measure, within 1 mm for each 100 mm. If they differ, this "
+        "is another link than the design's: stop here."
     )
     if collars:
         yield (
             "Fit the printed *collars* on the bare link, without tape, and strap them. *Check:* no part rocks, the "
-            "slots between the parts are open all along, and the pencil line of end 1 is at the step of its collar, "
-            "within 1 mm. Then take them off again."
+            "slots between the parts are open all along, and the pencil line of its end is at the step of each collar, "
+            "within 1 mm. Draw edge 0 now where *Place* takes it from a collar. Then take them off again."
         )
     holes = any(design.layout.holes for design in designs)
     pins = (
         " Before that, put the flat-headed *pins* into its holes from the inside, their heads flush in the foam; "
-        "every further part is pushed over them. The corner beside the lead has no hole: a mirrored part does not fit."
+        "every further part is pushed over them. The corner at the tabs has no hole: a mirrored part does not fit."
         if holes
         else ""
     )
@@ -145,10 +146,10 @@ def _wrap_steps(designs: Sequence[SheetDesign], collars: bool) -> Iterator[str]:
             "before it. *Check:* sides of one name lie over each other, and it wears the face up that its letters say."
         )
     seen = "anticlockwise as seen when you look from end 2 towards end 1"
-    strips = f"strips of {TAPE} 3 mm wide on both of its faces, along its rim and outside the foils only"
+    strips = f"strips of {TAPE} 3 mm wide on both of its faces, along its rim"
     isolation = (
-        f"Wrap part 4, outside up. Fix it with {strips}: adhesive on the active area would glue the conductive sheets "
-        "apart."
+        f"Wrap part 4, outside up, its rim flush with part 1's. Fix it with {strips}, also over covered foils, but "
+        "never on the active area, where adhesive would glue the conductive sheets apart."
     )
     if stack.assembly == "loose":
         yield (
@@ -179,11 +180,11 @@ def _wrap_steps(designs: Sequence[SheetDesign], collars: bool) -> Iterator[str]:
             "tape under a part opens it more; that is meant to be so."
         )
     yield (
-        "*Check* after each wrapped part: both edges are straight, the rim stands within 0.5 mm of the pencil line all "
-        "around, and there is no fold; a part is peeled off and laid again within a minute, later it tears. After part "
-        "5, measure again from wire to wire: A-B and C-D as before, and A to C above 10 Mohm. Roll part 1, and "
-        "the margins of part 7, as above; on the isolation and above the active area only smooth by hand, for the "
-        "roller would press the two conductive sheets together."
+        "*Check* after each wrapped part: both edges are straight, the rim (of parts 3 and 5 their outline) stands "
+        "within 0.5 mm of its line all around, and there is no fold; a part is peeled off and laid again within a "
+        "minute, later it tears. After part 5, measure again from wire to wire: A-B and C-D as before, and A to C "
+        "above 10 Mohm. Roll part 1, and the margins of part 7, as above; on the isolation and above the active area "
+        "only smooth by hand, for the roller would press the two conductive sheets together."
     )
     if options.overlap:
         yield f"Fold the flap of part 7, {in_mm(options.overlap)} wide, over edge 0 and fix it with {TAPE}."
@@ -202,11 +203,12 @@ def _cable_steps(tab: float) -> Iterator[str]:
     if tab:
         yield "Fold the *tabs* outwards along the green lines, away from the link."
     yield (
-        "Lead the four wires together by the *cable*'s way. Glue the cable-tie mount at its place. Lay the wires flat, "
-        "leave a loop of 20 mm so that no pull reaches a tab, and tie them down. Crimp the connector: pin 1 A (red), "
-        "pin 2 B (black), pin 3 C (yellow), pin 4 D (green). Write the sheet's number on both halves of the connector. "
-        "*Check:* pull each wire as hard as 3 N behind the tie: nothing moves before it; and move the joint of the arm "
-        "through its whole range by hand (freedrive): nothing is pinched or stretched."
+        "Once every sheet and collar is on, lead the four wires together by the *cable*'s way. Glue the cable-tie "
+        "mount at its place. Lay the wires flat, leave a loop of 20 mm so that no pull reaches a tab, and tie them "
+        "down. Crimp the connector: pin 1 A (red), pin 2 B (black), pin 3 C (yellow), pin 4 D (green). Write the "
+        "sheet's number on both halves of the connector. *Check:* pull each wire as hard as 3 N behind the tie: "
+        "nothing moves before it; and move the joint of the arm through its whole range by hand (freedrive): nothing "
+        "is pinched or stretched."
     )
 
 
@@ -255,8 +257,8 @@ def common_lines(designs: Sequence[SheetDesign], figures: Sequence[BuildFigures]
     yield (
         f"{_FLAT_AND_WRAPPED[designs[0].options.stack.assembly]}{order}. A word in *italics* is a row of the sheet's "
         "own table. Wherever a step says *outside up* or *inside up*, that face of the sensor looks at you: the inside "
-        "faces the link later. Every part carries the names of link and sheet and the face that is up; a foil its "
-        "letter beside them, any other part its number, its name, its material and the names of its four sides. End 1 "
+        "faces the link later. Every part carries the names of link and sheet and the face that is up, as far as it "
+        "has room; a foil its letter, any other part its number, name, material and the names of its four sides. End 1 "
         "is where B is, end 2 where A is, edge 0 where D is, the other edge where C is. Where two sheets meet, both "
         "ends carry the number of their joint."
     )
@@ -378,7 +380,7 @@ def _own_rows(design: SheetDesign, figures: BuildFigures, folder: str, number: i
         yield "collars", " and ".join(f"end {collar.end}" for collar in figures.collars)
     if design.has_seam:
         gap = side.wrap * side.cos_half_angle * ADHESIVE
-        yield "seam", f"opens by {in_mm(gap)} for each layer of tape, at most {in_mm(3.0 * gap)} at part 7"
+        yield "seam", f"opens by {in_mm(gap)} for each layer of tape, at most {in_mm(5.0 * gap)} at part 7"
     yield "cable", _way_text(design)
     for name, pins, pair in zip(("upper_sheet_ohm", "lower_sheet_ohm"), ("1-2", "3-4"), figures.pairs, strict=True):
         yield name, f"reading {pins} divided by {pair.squares:.4f}, nominally {pair.ohms / pair.squares:.4g}"

@@ -52,7 +52,7 @@ def _blocked(design: SheetDesign, neighbors: Sequence[SheetDesign], end: int) ->
             continue
         sheet = SheetBody(other.place, thickness)
         bodies = (
-            (sheet, "it meets the sheet beside it: push it against that"),
+            (sheet, "it meets the sheet beside it: take its pencil line"),
             (other.apron.body(), _WIRES_MET),
             (other.way.body(), _WIRES_MET),
         )

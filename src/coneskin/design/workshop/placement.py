@@ -278,7 +278,7 @@ def find_placement(place: PlacedFrustum, mesh: Mesh | None = None, faces: Sequen
 def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:
     """Return the places where a side that is not round is bent most around end 1, from edge 0 on.
 
-    A place counts if it is bent a tenth more than a circle of the same arc, and no other within an eighth of the wrap
+    A place counts if it is bent a fifth more than a circle of the same arc, and no other within an eighth of the wrap
     is bent more. It reaches as far as it is bent nearly as much.
 
     Returns:
@@ -310,7 +310,7 @@ def sharpest_bends(place: PlacedFrustum) -> list[tuple[float, float]]:
     found: dict[float, float] = {}
     for k, rate in enumerate(rates):
         (after, more), (before, also) = reached(k, 1), reached(k, -1)
-        if rate > 1.1 * round_rate and not more and not also:
+        if rate > 1.2 * round_rate and not more and not also:
             middle = starts[k] + 0.5 * (widths[k] + after - before)
             found[round(middle % side.wrap if closed else middle, 4)] = side.radius1 / rate
     return [(radius, middle * side.radius1) for middle, radius in sorted(found.items())]

@@ -14,6 +14,7 @@ from .placement import LinkFeature, SheetPlacement, sharpest_bends
 
 _AT_END = 3e-3  # m; a sheet so near to the end of a link is placed by eye
 _MAX_RULER = 0.2  # m; a ruler through the air
+_AROUND_END = "from edge 0, around end 1, in the direction of the wrap"
 
 
 def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]:
@@ -40,7 +41,8 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
         if not place.tilted or place.beyond < _AT_END:
             yield f"| line of end 2 | outermost place of the link on its side | {in_mm(place.beyond)} along the axis |"
     else:
-        yield "| the face of your link that you measured its height from | line of end 1 | 0 mm: choose it |"
+        height = in_mm(design.place.link_frustum.translation[2])
+        yield f"| where you choose z = 0 of the frame above, once for all sheets | line of end 1 | {height} along z |"
     yield f"| line of end 1 | line of end 2 | {in_mm(side.slant)} along the surface |"
     word = "once around the link" if side.wrap > 6.28 else "edge 0, around the link, to the other edge"
     yield f"| {word} | at end 1 | {in_mm(place.around1)} by tape measure |"
@@ -50,13 +52,17 @@ def placement_lines(design: SheetDesign, figures: BuildFigures) -> Iterator[str]
     yield ""
     yield from _height_lines(design, place)
     yield from _facing(design, place)
+    if place.before is not None and not place.heights and max(map(abs, far)) < 0.9998:  # a degree
+        yield "**No face of the link shows this axis, which leans.** Lay part 1 dry, slide it until it lies close"
+        yield "everywhere, at these distances, and draw its rim.\n"
     if place.before is None:
         pose = design.active.link_frustum
         yield (
-            "There is no mesh, so the link shows no datum: choose where end 1 and edge 0 lie, and draw them. In the "
-            "sensor file, `xyz_mm` and `rpy_deg` place the active area in the frame of your arm's link. Its end 1 is "
-            f"{in_mm(pose.translation[2])} further towards end 2, and its x points {math.degrees(pose.rpy[2]):.1f} deg "
-            "past edge 0, in the direction of the wrap. Its z runs from end 1 to end 2."
+            "There is no mesh, so the link shows no datum: choose where z = 0 and x of the frame lie, and draw them. "
+            "The link has to go on as its side does, as far as collars and cable reach. In the sensor file, `xyz_mm` "
+            "and `rpy_deg` place the active area in the frame of your arm's link. Its end 1 is at z = "
+            f"{in_mm(pose.translation[2])}, and its x points {math.degrees(pose.rpy[2]):.1f} deg past edge 0, in the "
+            "direction of the wrap. Its z runs from end 1 to end 2."
         )
     elif found := [(collar.play, collar.end) for collar in figures.collars if collar.play is not None]:
         play, end = min(found)
@@ -105,8 +111,7 @@ def _height_lines(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
         return
     side = design.place.frustum
     for face in place.faces:
-        long, wide = face.size
-        size = f"{1e3 * long:.0f} x {1e3 * wide:.0f} mm"
+        size = " x ".join(f"{1e3 * length:.0f}" for length in face.size) + " mm"
         yield f"* {face.name}: a flat face of the link, {size}, outlined in the picture of the link."
     yield ""
     bold = " Bold ones change most when the sheet is turned." if place.around_fixed else ""
@@ -138,9 +143,7 @@ def _facing(design: SheetDesign, place: SheetPlacement) -> Iterator[str]:
     facing = list(_axes_around(design))
     if not facing:
         return
-    yield from table_head(
-        "place that faces along an axis of the frame", "from edge 0, around end 1, in the direction of the wrap"
-    )
+    yield from table_head("place that faces along an axis of the frame", _AROUND_END)
     for name, phi in facing:
         yield f"| {name} | {in_mm(phi * design.place.frustum.radius1)} ({math.degrees(phi):.1f} deg) |"
     yield ""
@@ -151,12 +154,13 @@ def _bend_lines(design: SheetDesign) -> Iterator[str]:
     yield (
         "The link is not round, so its bends show where edge 0 is. A strip of paper that is laid around the link and "
         "marked at these places must lie with each mark in the middle of its bend:"
+        if (bends := sharpest_bends(design.place))
+        else "No bend of this side can be felt: find edge 0 by the picture of the link, which shows the frame's axes."
     )
     yield ""
-    yield from table_head(
-        "bend", "radius of the link there, at end 1", "from edge 0, around end 1, in the direction of the wrap"
-    )
-    for number, (radius, arc) in enumerate(sharpest_bends(design.place), 1):
+    if bends:
+        yield from table_head("bend", "radius of the link there, at end 1", _AROUND_END)
+    for number, (radius, arc) in enumerate(bends, 1):
         yield f"| {number} | {in_mm(radius)} | {in_mm(arc)} |"
     yield ""
 
@@ -187,8 +191,7 @@ def _strip_placement(design: SheetDesign) -> Iterator[str]:
     half1, half2 = 0.5 * side.wrap * side.radius1, 0.5 * side.wrap * side.radius2
     yield (
         f"It lies on the outside of {design.above}, over its seam, its ends flush with the ends of that sheet. Its "
-        "edge 0 "
-        "lies beside the edge of C of that sheet, its other edge beyond the seam."
+        "edge 0 lies beside the edge of C of that sheet, its other edge beyond the seam."
     )
     middle, seam = 0.5 * side.wrap, design.seam_offset
     yield ""
