@@ -152,6 +152,7 @@ def draw_curve(figure: Any, steps: Sequence[tuple[int, float]], names: Sequence[
     axes = figure.add_subplot()
     axes.step(*zip(*points, strict=True), where="post", color="#2a7fb8")
     axes.plot(*zip(*points[1 : included + 1], strict=True), "o", color="#2a7fb8")
+    look: dict[str, Any] = {"fontsize": 7, "rotation": -35, "rotation_mode": "anchor", "va": "top"}  # none on the next
     for at, name in zip(points[1:], names, strict=True):
-        axes.annotate(name, at, (3, -9), textcoords="offset points", fontsize=7)
+        axes.annotate(name, at, (6, -4), textcoords="offset points", **look)
     axes.set(xlabel="wires", ylabel="touchable active area [cm2]")
