@@ -39,8 +39,9 @@ from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side
 
 _WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another
-_SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
-_SWEEP_CELL = 1.5e-3  # m; along, away from and around the axis
+_SAMPLE_RADIUS = 2.5e-3  # m; of the space about each of them
+_SWEEP_CELL = 2e-3  # m; along, away from and around the axis
+_SWEEP_REACH = 0.02  # m; beyond a link, where tie and connector look for what comes near
 _SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
 _SWEEP_ROW = 2e-3  # m; along a sheet
 _LEAST_SLANT = 0.03  # m; a shorter rest of a sheet is not offered
@@ -77,27 +78,34 @@ class RobotDesign:
     reasons: tuple[str, ...]
 
 
-def _swept(axis: Pose, points: Floats, lower: float, upper: float) -> SphereBody:
-    """Return the space that a link takes while a joint turns over its range.
+def _swept(axis: Pose, points: Floats, lower: float, upper: float, beside: Floats) -> SphereBody:
+    """Return the space that a link takes while a joint turns over its range, as far as it comes near another link.
 
     Args:
         axis: pose of the joint, whose axis is z.
         points: of the link in that frame [m], shape (n, 3).
         lower: least angle by which they are turned [rad].
         upper: largest angle [rad].
+        beside: places of the other link in that frame [m], shape (n, 3).
     """
+    low, high = beside.min(axis=0) - _SWEEP_REACH, beside.max(axis=0) + _SWEEP_REACH
     away, azimuth = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
-    cells, number = np.unique(np.round(np.stack([away, points[:, 2]]) / _SWEEP_CELL), axis=1, return_inverse=True)
-    count = math.ceil(math.tau * away.max() / _SWEEP_CELL) + 1
-    turns = math.tau / count * np.arange(count)
-    begins = np.zeros((len(cells[0]), count), bool)
-    begins[number.ravel(), np.round((azimuth + lower) / turns[1]).astype(int) % count] = True
-    ahead = min(count - 1, math.ceil((upper - lower) / turns[1]))  # turns that are taken after each that begins
-    sums = np.cumsum(np.pad(np.hstack([begins[:, count - ahead :], begins]), ((0, 0), (1, 0))), axis=1)
-    cell, turn = np.nonzero(sums[:, ahead + 1 :] > sums[:, :count])
-    radius, height = _SWEEP_CELL * cells[:, cell]
-    swept = np.stack([radius * np.cos(turns[turn]), radius * np.sin(turns[turn]), height], axis=1)
-    return SphereBody(axis.apply_all(swept), _SAMPLE_RADIUS)
+    ring = np.round(away / _SWEEP_CELL).astype(int)
+    far = np.hypot(*np.maximum(-low, high)[:2])
+    ring[(points[:, 2] < low[2]) | (points[:, 2] > high[2]) | (away > far)] = -1
+    found = [np.empty((0, 3))]
+    for number in np.unique(ring[ring >= 0]):
+        height, row = np.unique(np.round(points[ring == number, 2] / _SWEEP_CELL), return_inverse=True)
+        count = max(1, math.ceil(math.tau * number))
+        step = math.tau / count
+        begins = np.zeros((len(height), count), bool)
+        begins[row, np.round((azimuth[ring == number] + lower) / step).astype(int) % count] = True
+        ahead = min(count - 1, math.ceil((upper - lower) / step))  # turns that are taken after each that begins
+        sums = np.cumsum(np.pad(np.hstack([begins[:, count - ahead :], begins]), ((0, 0), (1, 0))), axis=1)
+        at, turn = np.nonzero(sums[:, ahead + 1 :] > sums[:, :count])
+        swept = _SWEEP_CELL * np.stack([number * np.cos(step * turn), number * np.sin(step * turn), height[at]], axis=1)
+        found.append(swept[((swept > low) & (swept < high)).all(axis=1)])
+    return SphereBody(axis.apply_all(np.concatenate(found)), _SAMPLE_RADIUS)
 
 
 def _swept_beside(
@@ -116,9 +124,10 @@ def _swept_beside(
         child = Pose.along(joint.axis)
         parent = joint.origin @ child
         if link == joint.parent:
-            spaces.append(_swept(parent, child.inverse().apply_all(points), joint.lower, joint.upper))
+            axis, moved, ends = parent, child.inverse().apply_all(points), (joint.lower, joint.upper)
         else:
-            spaces.append(_swept(child, parent.inverse().apply_all(points), -joint.upper, -joint.lower))
+            axis, moved, ends = child, parent.inverse().apply_all(points), (-joint.upper, -joint.lower)
+        spaces.append(_swept(axis, moved, *ends, axis.inverse().apply_all(meshes[link].vertices)))
     return spaces
 
 
@@ -126,8 +135,8 @@ def _outside(sheet: SheetDesign) -> Floats:
     """Return places of the outer face of a sheet, as near to each other as those of a link [m], shape (n, 3)."""
     side = sheet.place.frustum
     around = side.wrap * max(side.radius1, side.radius2)
-    u = np.linspace(0.0, side.slant, math.ceil(side.slant / (2.0 * _SAMPLE_RADIUS)) + 1)
-    phi = np.linspace(0.0, side.wrap, math.ceil(around / (2.0 * _SAMPLE_RADIUS)) + 1)
+    u = np.linspace(0.0, side.slant, math.ceil(side.slant / _SAMPLE_RADIUS) + 1)
+    phi = np.linspace(0.0, side.wrap, math.ceil(around / _SAMPLE_RADIUS) + 1)
     return sheet.outer_face(*np.meshgrid(u, phi, indexing="ij"))[0].reshape(-1, 3)
 
 
