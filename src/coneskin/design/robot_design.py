@@ -39,8 +39,8 @@ from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side
 
 _WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another
-_SAMPLE_RADIUS = 2.5e-3  # m; of the space about each of them
-_SWEEP_CELL = 2e-3  # m; along, away from and around the axis
+_SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
+_SWEEP_CELL = 1.5e-3  # m; along, away from and around the axis
 _SWEEP_REACH = 0.02  # m; beyond a link, where tie and connector look for what comes near
 _SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
 _SWEEP_ROW = 2e-3  # m; along a sheet
@@ -135,8 +135,8 @@ def _outside(sheet: SheetDesign) -> Floats:
     """Return places of the outer face of a sheet, as near to each other as those of a link [m], shape (n, 3)."""
     side = sheet.place.frustum
     around = side.wrap * max(side.radius1, side.radius2)
-    u = np.linspace(0.0, side.slant, math.ceil(side.slant / _SAMPLE_RADIUS) + 1)
-    phi = np.linspace(0.0, side.wrap, math.ceil(around / _SAMPLE_RADIUS) + 1)
+    u = np.linspace(0.0, side.slant, math.ceil(side.slant / (2.0 * _SAMPLE_RADIUS)) + 1)
+    phi = np.linspace(0.0, side.wrap, math.ceil(around / (2.0 * _SAMPLE_RADIUS)) + 1)
     return sheet.outer_face(*np.meshgrid(u, phi, indexing="ij"))[0].reshape(-1, 3)
 
 
