@@ -5,6 +5,7 @@ The guard's commands are a letter and doubles, because they are sent from the li
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import NamedTuple
 
@@ -36,14 +37,16 @@ class SetJointVelocity(NamedTuple):
     Attributes:
         qd: joint speeds [rad/s].
         acceleration: of the leading joint [rad/s2].
+        decided: host time of the decision [s], which the sender fills in: one that was held up is not followed.
     """
 
     qd: Joints
     acceleration: float
+    decided: float = -math.inf
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"V" + struct.pack(f"<{len(self.qd) + 1}d", *self.qd, self.acceleration)
+        return b"V" + struct.pack(f"<{len(self.qd) + 2}d", *self.qd, *self[1:])
 
 
 class EndReaction(NamedTuple):
@@ -128,8 +131,8 @@ def decode_command(message: bytes) -> GuardCommand:
     letter, body = message[:1], message[1:]
     try:
         if letter == b"V":
-            *qd, acceleration = struct.unpack(f"<{len(body) // _ONE_DOUBLE.size}d", body)
-            return SetJointVelocity(tuple(qd), acceleration)
+            *qd, acceleration, decided = struct.unpack(f"<{len(body) // _ONE_DOUBLE.size}d", body)
+            return SetJointVelocity(tuple(qd), acceleration, decided)
         if letter == b"C":
             return Release(*_ONE_NUMBER.unpack(body))
         if letter in (b"S", b"H"):

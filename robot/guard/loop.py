@@ -103,8 +103,10 @@ class _Outbox:
 
     def _send(self, output: Command) -> bool:
         ports = self._ports
-        if isinstance(output, (SetJointVelocity, SetpointProgram)) and self._clock() - self.since > SETPOINT_SILENCE:
+        if isinstance(output, SetpointProgram) and self._clock() - self.since > SETPOINT_SILENCE:
             return False  # this process was held up meanwhile: the arm was stopped, and nobody looked at its skin
+        if isinstance(output, SetJointVelocity):
+            output = output._replace(decided=self.since)
         if isinstance(output, (StopProgram, SetJointVelocity, EndReaction, Release)):  # first the one that is in haste
             channel = ports.driver if ports.watchdog is None else ports.watchdog
             return channel is not None and channel.send(output.encode())

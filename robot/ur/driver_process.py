@@ -201,13 +201,12 @@ class DriverProcess:
         wait_readable([self._guard, self._program], timeout)
         now = self._clock()
         self._take_guard(now)
-        for count, message in enumerate(self._program.receive()):
-            if count:  # a stop must not wait behind all that the threads of a program have asked for
-                self._take_guard(self._clock())
-                self._kick(self._clock())
+        for message in self._program.receive():
+            self._take_guard(self._clock())  # a stop must not wait behind all that a program has asked for
             if self._guard.closed:
                 return False
             self._serve_program(message)
+            self._kick(self._clock())
         if self._guard.closed or self._program.closed:
             return False
         if self._waiting and not self._arm.moving():
@@ -246,9 +245,10 @@ class DriverProcess:
                     self._answer_waiting(ok=False, stopped=True, why="the guard has stopped the arm")
                     self._stop(deceleration)
                     self._guard.send(StatusReport("done").encode())
-                case SetJointVelocity(qd, acceleration) if not self._forbidden:
-                    self._allowed, self._patience, self._expires = False, SETPOINT_SILENCE, math.inf
-                    self._arm.speed("speed_j", qd, acceleration)
+                case SetJointVelocity(qd, acceleration, decided) if not self._forbidden:
+                    if self._clock() - decided <= SETPOINT_SILENCE:  # else the guard, or this process, was held up
+                        self._allowed, self._patience, self._expires = False, SETPOINT_SILENCE, math.inf
+                        self._arm.speed("speed_j", qd, acceleration)
                 case Release(number):
                     self._work(_START_TIMEOUT)
                     self._arm.revive()

@@ -23,7 +23,7 @@ finite = st.floats(allow_nan=False)
         st.builds(EndReaction, finite),
         st.builds(Release, st.integers(0, 2**64 - 1)),
         st.sampled_from([Heartbeat(), Shutdown()]),
-        st.builds(SetJointVelocity, st.tuples(*[finite] * 6), finite),
+        st.builds(SetJointVelocity, st.tuples(*[finite] * 6), finite, finite),
     )
 )
 def test_commands_survive_the_wire(command):

@@ -254,7 +254,8 @@ def test_a_guard_that_was_held_up_between_a_decision_and_its_command_moves_nothi
     ends_motion = JointVelocitySetpoint(0, qd, 0.0)
     for command in (motion, program, *stopping, stop_path, ends_motion):  # stops however late
         outbox.append(command)
-    assert driver_end.receive() == [one.encode() for one in (*[motion][:sent], *stopping)]
+    dated = motion._replace(decided=1.0)  # the driver process looks at that
+    assert driver_end.receive() == [one.encode() for one in (dated, *stopping)]
     assert setpoints.mock_calls == [call.write(ends_motion)]
     assert stops.mock_calls == [*[call.follow(program)][:sent], call.use(*stop_path)]
 

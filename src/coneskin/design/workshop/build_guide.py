@@ -117,8 +117,7 @@ def _flat_steps(designs: Sequence[SheetDesign]) -> Iterator[str]:
 
 def _wrap_steps(designs: Sequence[SheetDesign], collars: bool) -> Iterator[str]:
     """Yield the steps from the clean link to the sheet that holds on it."""
-    first = designs[0]
-    stack, options = first.options.stack, first.options
+    stack, options = designs[0].options.stack, designs[0].options
     marks = "the blue outline on part 1"
     yield (
         "Clean *what it lies on* with isopropanol and a cloth that leaves no lint, and let it dry for a minute. Draw "
