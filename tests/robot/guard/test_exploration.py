@@ -101,8 +101,13 @@ def test_without_one_who_listens_the_arm_moves_on(
     assert breaks in explore(world, stop_at_first=True).broken
 
 
-def test_a_setpoint_that_outlives_the_silence_of_its_guard_moves_a_latched_arm() -> None:
-    world = ProcessWorld("internal", Parts(setpoint=math.inf), most_wrong=1)
+@pytest.mark.parametrize(
+    ("parts", "most_wrong"), [({"forbids": False, "setpoint": math.inf}, 1), ({"forbids": False}, 2)]
+)
+def test_a_setpoint_that_outlives_the_silence_of_its_guard_moves_a_latched_arm(
+    parts: dict[str, float], most_wrong: int
+) -> None:
+    world = ProcessWorld("internal", Parts(**parts), most_wrong)  # type: ignore[arg-type]
     assert "released" in explore(world, stop_at_first=True).broken
 
 

@@ -44,7 +44,8 @@ class Parts:
         hold_up: the same, where this computer lets it wait for a processor [s].
         guard_silence: of the guard, as its helper hears it [s].
         second_silence: the same, as the second watchdog hears it, with external control [s].
-        setpoint: for which one that was held up with the guard moves the arm [s]; then the driver process takes none.
+        setpoint: after its decision, for which one that was held up moves the arm [s].
+        forbids: the driver process takes none after it has stopped the arm for the guard's silence.
         watchdog: after which the controller ends a program that hears nothing [s]: with internal control that of the
             driver process, with external control one with the lines of ``coneskin heartbeat``.
         watchdog_period: 1 / ``watchdog_hz`` of the scene, which that is meant to be [s].
@@ -56,6 +57,7 @@ class Parts:
     hold_up: float = HOLD_UP_LIMIT
     second_silence: float = UNGUARDED_TIME
     setpoint: float = SETPOINT_SILENCE
+    forbids: bool = True
     watchdog: float = 0.25
     watchdog_period: float = 0.25
 
@@ -95,7 +97,8 @@ class _State(NamedTuple):  # a tuple, since it is compared and hashed a million 
     guard_age: int = 0  # as the helper hears it
     second_age: int = 0  # as the second watchdog hears the guard
     kick_age: int = 0  # as the controller hears the driver process, or the guard's count
-    began: bool = False  # the guard was frozen while it moved the arm away, with a setpoint that it had begun to send
+    holder: str = ""  # who was frozen or held up with a setpoint that it had not sent, or not read
+    decided: int = 0  # ticks since the decision on that one
     wrong_for: int = 0  # ticks that the arm has moved since the newest thing went wrong
     lost: int = 0  # beats in a row that were lost
 
@@ -169,19 +172,18 @@ class ProcessWorld:
     def act(self, action: str) -> list[str]:
         before, broken = self.state, list[str]()
         match action.split():
-            case ["freeze", name]:
-                began = self.control == "internal" and before.moves and not before.latched
+            case ["freeze" | "hold" as how, name]:
+                away = self.control == "internal" and before.moves and not before.latched
+                holds = away and name in ("guard", "helper") and before.guard == before.helper == _ALIVE
+                setpoint = {"holder": name, "decided": 0} if holds else {}
                 self.state = before._replace(
-                    **{name: _FROZEN}, began=began if name == "guard" else before.began, wrong_for=0
+                    **{name: _FROZEN if how == "freeze" else _HELD_UP}, **setpoint, wrong_for=0
                 )
-            case ["hold", name]:
-                self.state = before._replace(**{name: _HELD_UP}, wrong_for=0)
             case ["kill", name]:
                 self.state = before._replace(**{name: _DEAD}, wrong_for=0)
-            case ["thaw", "guard"]:
-                broken = self._thaw_guard()
             case ["thaw", name]:
                 self.state = before._replace(**{name: _ALIVE}, wrong_for=0)
+                broken = self._hand_on() if name == before.holder else []
             case ["restart"]:  # the program ends, its processes with it, and a new one begins with a guard that waits
                 self.state = _State(moves=False, latched=True, cut=before.cut, touched=before.touched)
             case ["cut", *_] | ["mend", *_]:
@@ -194,12 +196,16 @@ class ProcessWorld:
                 broken = self._tick(lost=action != "tick")
         return broken
 
-    def _thaw_guard(self) -> list[str]:
-        """Let the guard go on, which first sends what it had begun to; a driver process that ended takes nothing."""
+    def _hand_on(self) -> list[str]:
+        """Let who holds a setpoint go on: the guard sends it, the helper follows it, one that ended does nothing."""
         state = self.state
-        heard = state.began and state.program != _DEAD and state.helper == _ALIVE and not state.cut
-        follows = heard and state.guard_age <= _ticks(self.parts.setpoint)
-        self.state = state._replace(guard=_ALIVE, began=False, moves=state.moves or follows, wrong_for=0)
+        if state.holder == "guard" and state.helper in (_FROZEN, _HELD_UP):
+            self.state = state._replace(holder="helper")
+            return []
+        heard = state.program != _DEAD and state.helper == _ALIVE and not state.cut
+        heard &= state.kick_age <= _ticks(self.parts.watchdog)  # else the controller has ended the program that follows
+        follows = heard and state.decided <= _ticks(self.parts.setpoint)
+        self.state = state._replace(holder="", decided=0, moves=state.moves or follows)
         return ["released: a setpoint that was held up moves the arm"] if follows and not state.moves else []
 
     def _reset(self) -> None:
@@ -242,10 +248,9 @@ class ProcessWorld:
             states_silent = state.cut
             if state.touched or silent or gone or states_silent:
                 stop, latch = reaches, True
+        forbidden = helper and age["guard_age"] > _ticks(parts.guard_silence)
         if helper:
-            if age["guard_age"] > _ticks(parts.guard_silence) or (
-                state.guard == _DEAD and parts.guard_silence < math.inf
-            ):
+            if forbidden or (state.guard == _DEAD and parts.guard_silence < math.inf):
                 stop = stop or reaches
             stop |= reaches and internal and state.program == _DEAD
         if second and not internal:
@@ -263,6 +268,10 @@ class ProcessWorld:
             latched=state.latched or latch or (state.moves and not moves),
             wrong_for=wrong_for,
             lost=state.lost + 1 if lost and moves else 0,
+            decided=_aged(state.decided, _ticks(parts.setpoint), True) if state.holder else 0,
+            # what the helper has not read is overtaken by the guard's stop, and after one for the guard's silence it
+            # takes none
+            holder="" if (latch and state.holder == "helper") or (parts.forbids and forbidden) else state.holder,
         )
         return self._judge(state, lost)
 
