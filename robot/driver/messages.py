@@ -5,7 +5,6 @@ The guard's commands are a letter and doubles, because they are sent from the li
 
 from __future__ import annotations
 
-import math
 import struct
 from typing import NamedTuple
 
@@ -37,16 +36,30 @@ class SetJointVelocity(NamedTuple):
     Attributes:
         qd: joint speeds [rad/s].
         acceleration: of the leading joint [rad/s2].
-        decided: host time of the decision [s], which the sender fills in: one that was held up is not followed.
     """
 
     qd: Joints
     acceleration: float
-    decided: float = -math.inf
 
     def encode(self) -> bytes:
         """Return the message."""
-        return b"V" + struct.pack(f"<{len(self.qd) + 2}d", *self.qd, *self[1:])
+        return b"V" + struct.pack(f"<{len(self.qd) + 1}d", *self.qd, self.acceleration)
+
+
+class DatedVelocity(NamedTuple):
+    """Speeds as they are sent to the driver process, which follows none that were held up anywhere.
+
+    Attributes:
+        decided: host time of the decision [s].
+        velocity: the speeds.
+    """
+
+    decided: float
+    velocity: SetJointVelocity
+
+    def encode(self) -> bytes:
+        """Return the message."""
+        return b"D" + _ONE_DOUBLE.pack(self.decided) + self.velocity.encode()[1:]
 
 
 class EndReaction(NamedTuple):
@@ -95,7 +108,7 @@ class Shutdown(NamedTuple):
 
 #: written out: compiled, a loop over both takes them for plain tuples without items
 _WORD_COMMANDS: dict[bytes, Heartbeat | Shutdown] = {b"A": Heartbeat(), b"F": Shutdown()}
-GuardCommand = StopProgram | SetJointVelocity | EndReaction | Release | Heartbeat | Shutdown
+GuardCommand = StopProgram | DatedVelocity | SetJointVelocity | EndReaction | Release | Heartbeat | Shutdown
 
 
 class StatusReport(NamedTuple):
@@ -122,6 +135,10 @@ class StatusReport(NamedTuple):
         return cls(kind, text)
 
 
+def _doubles(body: bytes) -> tuple[float, ...]:
+    return struct.unpack(f"<{len(body) // _ONE_DOUBLE.size}d", body)
+
+
 def decode_command(message: bytes) -> GuardCommand:
     """Return the command in a message of the guard.
 
@@ -130,9 +147,12 @@ def decode_command(message: bytes) -> GuardCommand:
     """
     letter, body = message[:1], message[1:]
     try:
+        if letter == b"D":
+            (decided,), (*qd, acceleration) = _ONE_DOUBLE.unpack(body[:8]), _doubles(body[8:])
+            return DatedVelocity(decided, SetJointVelocity(tuple(qd), acceleration))
         if letter == b"V":
-            *qd, acceleration, decided = struct.unpack(f"<{len(body) // _ONE_DOUBLE.size}d", body)
-            return SetJointVelocity(tuple(qd), acceleration, decided)
+            *qd, acceleration = _doubles(body)
+            return SetJointVelocity(tuple(qd), acceleration)
         if letter == b"C":
             return Release(*_ONE_NUMBER.unpack(body))
         if letter in (b"S", b"H"):

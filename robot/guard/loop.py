@@ -21,7 +21,15 @@ from coneskin.core.errors import ConeSkinError, SkinTimeout
 from coneskin.core.process_watch import ProcessWatch, load
 from coneskin.core.recording.block import Block, encode_block
 from coneskin.robot.driver.liveness import BEAT_PERIOD, SETPOINT_SILENCE
-from coneskin.robot.driver.messages import EndReaction, Heartbeat, Release, SetJointVelocity, Shutdown, StopProgram
+from coneskin.robot.driver.messages import (
+    DatedVelocity,
+    EndReaction,
+    Heartbeat,
+    Release,
+    SetJointVelocity,
+    Shutdown,
+    StopProgram,
+)
 from coneskin.robot.driver.protocol import (
     HeartbeatWriter,
     PayloadReader,
@@ -105,11 +113,10 @@ class _Outbox:
         ports = self._ports
         if isinstance(output, SetpointProgram) and self._clock() - self.since > SETPOINT_SILENCE:
             return False  # this process was held up meanwhile: the arm was stopped, and nobody looked at its skin
-        if isinstance(output, SetJointVelocity):
-            output = output._replace(decided=self.since)
         if isinstance(output, (StopProgram, SetJointVelocity, EndReaction, Release)):  # first the one that is in haste
             channel = ports.driver if ports.watchdog is None else ports.watchdog
-            return channel is not None and channel.send(output.encode())
+            sent = DatedVelocity(self.since, output) if isinstance(output, SetJointVelocity) else output
+            return channel is not None and channel.send(sent.encode())
         if isinstance(output, UseStopPath):
             if output.path is StopPath.WATCHDOG:
                 return ports.watchdog is not None and ports.watchdog.send(StopProgram(output.deceleration).encode())

@@ -24,11 +24,11 @@ from coneskin.core.errors import ConeSkinError
 from coneskin.robot.driver.deadman import Deadman
 from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import (
+    DatedVelocity,
     EndReaction,
     GuardCommand,
     Heartbeat,
     Release,
-    SetJointVelocity,
     StatusReport,
     StopProgram,
     decode_command,
@@ -132,7 +132,7 @@ def _duration(request: dict[str, Any]) -> float:
     return duration
 
 
-_MOTION_COMMANDS = (StopProgram, EndReaction, SetJointVelocity)
+_MOTION_COMMANDS = (StopProgram, EndReaction, DatedVelocity)
 _START_TIMEOUT = 3.0  # s for the controller to start the control program again
 _MOVE_POLL_PERIOD = 0.005  # s between two looks at a move whose end the program waits for
 
@@ -225,7 +225,7 @@ class DriverProcess:
         commands = [decode_command(message) for message in self._guard.receive()]
         newest = max((n for n, command in enumerate(commands) if isinstance(command, _MOTION_COMMANDS)), default=0)
         for number, command in enumerate(commands):
-            if isinstance(command, SetJointVelocity) and number < newest:
+            if isinstance(command, DatedVelocity) and number < newest:
                 continue  # a newer motion command has overtaken it
             if self._patience != SETPOINT_SILENCE or not isinstance(command, Heartbeat):
                 self._heard = now
@@ -245,7 +245,7 @@ class DriverProcess:
                     self._answer_waiting(ok=False, stopped=True, why="the guard has stopped the arm")
                     self._stop(deceleration)
                     self._guard.send(StatusReport("done").encode())
-                case SetJointVelocity(qd, acceleration, decided) if not self._forbidden:
+                case DatedVelocity(decided, (qd, acceleration)) if not self._forbidden:
                     if self._clock() - decided <= SETPOINT_SILENCE:  # else the guard, or this process, was held up
                         self._allowed, self._patience, self._expires = False, SETPOINT_SILENCE, math.inf
                         self._arm.speed("speed_j", qd, acceleration)

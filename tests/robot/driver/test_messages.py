@@ -4,6 +4,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from coneskin.robot.driver.messages import (
+    DatedVelocity,
     EndReaction,
     Heartbeat,
     Release,
@@ -23,7 +24,8 @@ finite = st.floats(allow_nan=False)
         st.builds(EndReaction, finite),
         st.builds(Release, st.integers(0, 2**64 - 1)),
         st.sampled_from([Heartbeat(), Shutdown()]),
-        st.builds(SetJointVelocity, st.tuples(*[finite] * 6), finite, finite),
+        velocities := st.builds(SetJointVelocity, st.tuples(*[finite] * 6), finite),
+        st.builds(DatedVelocity, finite, velocities),
     )
 )
 def test_commands_survive_the_wire(command):
@@ -38,7 +40,7 @@ def test_nonsense_is_refused(message):
         command = decode_command(message)
     except ValueError:
         return
-    assert command.encode() == message or message[:1] in b"VSHC"
+    assert command.encode() == message or message[:1] in b"DVSHC"
 
 
 @given(st.text(st.characters()))

@@ -10,7 +10,7 @@ import pytest
 from coneskin.core.channel import Channel, pair
 from coneskin.core.errors import SkinConnectionError
 from coneskin.core.recording.block import Block, decode_blocks, encode_block
-from coneskin.robot.driver.messages import EndReaction, SetJointVelocity, StopProgram
+from coneskin.robot.driver.messages import DatedVelocity, EndReaction, SetJointVelocity, StopProgram
 from coneskin.robot.driver.values import JointVelocitySetpoint, SetpointProgram, SetSpeedSlider, StopPath, UseStopPath
 from coneskin.robot.guard import loop as module
 from coneskin.robot.guard.loop import GuardLoop, GuardPorts, _Outbox
@@ -254,7 +254,7 @@ def test_a_guard_that_was_held_up_between_a_decision_and_its_command_moves_nothi
     ends_motion = JointVelocitySetpoint(0, qd, 0.0)
     for command in (motion, program, *stopping, stop_path, ends_motion):  # stops however late
         outbox.append(command)
-    dated = motion._replace(decided=1.0)  # the driver process looks at that
+    dated = DatedVelocity(1.0, motion)  # the driver process looks at that
     assert driver_end.receive() == [one.encode() for one in (dated, *stopping)]
     assert setpoints.mock_calls == [call.write(ends_motion)]
     assert stops.mock_calls == [*[call.follow(program)][:sent], call.use(*stop_path)]

@@ -6,6 +6,7 @@ import pytest
 
 from coneskin.robot.driver.liveness import GUARD_SILENCE, SETPOINT_SILENCE
 from coneskin.robot.driver.messages import (
+    DatedVelocity,
     EndReaction,
     Heartbeat,
     Release,
@@ -138,7 +139,7 @@ def test_nothing_is_waited_for_after_a_stop_of_the_program_or_a_reset(driver, en
 
 def test_a_retreat_and_its_halt(driver):
     served, made, guard, _ = driver
-    guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0, 10.0).encode())
+    guard.send(DatedVelocity(10.0, SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0)).encode())
     served.poll(0.0)
     guard.send(EndReaction(8.0).encode())
     served.poll(0.0)
@@ -159,7 +160,7 @@ def test_when_either_side_ends_the_arm_is_stopped(driver, side):
 def test_an_error_of_the_wheel_goes_to_the_guard(driver):
     served, made, guard, _ = driver
     made.control.accepts = False
-    guard.send(SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0, 10.0).encode())
+    guard.send(DatedVelocity(10.0, SetJointVelocity((0.1, 0, 0, 0, 0, 0), 2.0)).encode())
     served.poll(0.0)
     notes = [StatusReport.decode(message) for message in guard.receive()]
     assert notes[0].kind == "error"
@@ -223,7 +224,7 @@ def test_a_silent_guard_counts_as_dead(driver, now):
 @pytest.mark.promise("P43")
 def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(driver, now):
     served, made, guard, _ = driver
-    for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0, 10.0)):
+    for message in (Release(7), StopProgram(10.0), DatedVelocity(10.0, SetJointVelocity((0.1,) * 6, 4.0))):
         guard.send(message.encode())
     served.poll(0.0)
     before = len(stops(made.control))
@@ -242,7 +243,7 @@ def test_a_guard_that_falls_silent_while_it_moves_the_arm_does_not_move_it_on(dr
 @pytest.mark.promise("P43")
 def test_a_setpoint_that_was_held_up_with_the_guard_does_not_move_an_arm_that_was_stopped_for_it(driver, now):
     served, made, guard, _ = driver
-    setpoint = SetJointVelocity((0.1,) * 6, 4.0, 10.0)
+    setpoint = DatedVelocity(10.0, SetJointVelocity((0.1,) * 6, 4.0))
     for message in (Release(7), StopProgram(10.0), setpoint):
         guard.send(message.encode())
     served.poll(0.0)
@@ -263,7 +264,7 @@ def test_a_setpoint_that_was_held_up_with_the_guard_does_not_move_an_arm_that_wa
 def test_a_setpoint_that_was_held_up_anywhere_moves_nothing(driver, decided, moves):
     """As where the guard was frozen while it sent the first one, or this process before it read it."""
     served, made, guard, _ = driver
-    for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0, decided)):
+    for message in (Release(7), StopProgram(10.0), DatedVelocity(decided, SetJointVelocity((0.1,) * 6, 4.0))):
         guard.send(message.encode())
     served.poll(0.0)
     assert ("speedJ" in [call[0] for call in made.control.calls]) == moves
@@ -288,7 +289,7 @@ def test_a_stop_that_came_during_a_release_is_served_before_the_first_request(dr
 
 def test_a_sign_of_life_is_no_new_speed(driver, now):
     served, made, guard, _ = driver
-    for message in (Release(7), StopProgram(10.0), SetJointVelocity((0.1,) * 6, 4.0, 10.0)):
+    for message in (Release(7), StopProgram(10.0), DatedVelocity(10.0, SetJointVelocity((0.1,) * 6, 4.0))):
         guard.send(message.encode())
     served.poll(0.0)
     before = len(stops(made.control))
@@ -304,13 +305,13 @@ def test_speeds_that_waited_are_overtaken_by_what_came_later(driver):
     for message in (
         Release(7),
         StopProgram(10.0),
-        *[SetJointVelocity((0.1 * k,) * 6, 4.0, 10.0) for k in range(9)],
+        *[DatedVelocity(10.0, SetJointVelocity((0.1 * k,) * 6, 4.0)) for k in range(9)],
         Heartbeat(),
     ):
         guard.send(message.encode())
     served.poll(0.0)
     assert [call[2] for call in made.control.calls if call[0] == "speedJ"] == [pytest.approx(0.8)]
-    for message in (*[SetJointVelocity((0.1 * k,) * 6, 4.0, 10.0) for k in range(9)], EndReaction(10.0)):
+    for message in (*[DatedVelocity(10.0, SetJointVelocity((0.1 * k,) * 6, 4.0)) for k in range(9)], EndReaction(10.0)):
         guard.send(message.encode())
     served.poll(0.0)
     assert [call[0] for call in made.control.calls if call[0].startswith("speed")] == ["speedJ", "speedStop"]
@@ -392,7 +393,7 @@ def test_the_retreat_of_the_guard_does_not_end_with_the_speeds_of_the_program(dr
     guard.send(Release(7).encode())
     ask(program, do="speed_j", qd=[0.5] * 6, acceleration=2.0, duration=0.05, sent=now[0])
     served.poll(0.0)
-    guard.send(SetJointVelocity((0.1,) * 6, 4.0, 10.0).encode())
+    guard.send(DatedVelocity(10.0, SetJointVelocity((0.1,) * 6, 4.0)).encode())
     served.poll(0.0)
     now[0] += 0.09
     served.poll(0.0)
