@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 _WRAP_ROUNDING = 1e-6  # rad; the widths of the bends add up to the wrap but for rounding
 _MIN_BEND_WIDTH = 1e-9  # rad; what is left of a bend that is cut is at least so wide
 _AT_EDGE = 1e-9  # rad; a foot so close to an edge may lie beyond it
+_MAX_ONE_FOOT = 3.0  # rad; a strip that turns by less than half a turn has one foot at most
 _NORMAL_COUNT = 360  # by which the middle of a section is found
 _MAX_OPENING = 0.01  # of a turn, and of the way around; a fitted wrap is a hundred times closer
 
@@ -225,15 +226,26 @@ class Developable(PlacedFrustum):
         return u.reshape(shape), phi.reshape(shape), distance.reshape(shape)
 
     def _feet(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return u, phi and the distance of points in the frame of the side, shape (n, 3)."""
+        """Return u, phi and the distance of points in the frame of the side, shape (n, 3).
+
+        The nearest foot lies on a ruling between two strips, or in a strip along which it comes nearer, then goes away.
+        """
         import numpy as np
 
-        best, phi = np.full(len(points), np.inf), np.zeros(len(points))
+        rulings = [*(strip.first for strip in self._strips), self.edge()]
+        at, t, n = (np.array([getattr(ruling, name) for ruling in rulings]) for name in ("at", "t", "n"))
+        ahead, above = (points @ way.T - (at * way).sum(axis=1) for way in (t, n))
+        square = ahead**2 + above**2
+        nearest = square.argmin(axis=1)
+        best = np.sqrt(square[np.arange(len(points)), nearest])
+        phi = np.array([*self._starts, self._starts[-1] + self.bends[-1].width])[nearest]
         for number, strip in enumerate(self._strips):
-            along, gap = strip.feet(points, 0.0, strip.arc)
-            better = gap < best
-            best[better] = gap[better]
-            phi[better] = self._starts[number] + along[better] * self.bends[number].width / strip.arc
+            passed = (ahead[:, number] > 0.0) & (ahead[:, number + 1] < 0.0)
+            some = np.flatnonzero(passed | (math.hypot(strip.g, strip.k) * strip.arc > _MAX_ONE_FOOT))
+            along, gap = strip.feet(points[some], 0.0, strip.arc)
+            better = gap < best[some]
+            best[some[better]] = gap[better]
+            phi[some[better]] = self._starts[number] + along[better] * self.bends[number].width / strip.arc
         if not self.closed:  # beyond its edges the outer strips go on, but not over the side itself
             for number, edge in ((0, 0.0), (-1, self.frustum.wrap)):
                 strip, out = self._strips[number], np.abs(phi - edge) < _AT_EDGE

@@ -35,6 +35,7 @@ _MAX_TAB_RISE = 0.3e-3  # m; of the link above the height at which tabs leave
 _TIE_SPACE = 14e-3  # m; between the middles of tie and connector
 _LEAST_WAY = 32e-3  # m; from the rim to the connector, with room for the tie
 _SHORTER_WAYS = (1.0, 0.8, 0.65)  # of the wished length
+_BOX_COUNT = 64  # azimuths by which the box around a sheet is found
 _MAX_ENDS = 60  # places for the connector that are tried
 
 
@@ -67,7 +68,15 @@ class SheetBody:
 
     def near(self, points: Floats, distance: float) -> Bools:
         """Return whether each point, shape (n, 3) [m], is at most a distance away [m]."""
-        return np.asarray(self.distances(points) <= distance)
+        side = self.place.frustum
+        phi = np.linspace(0.0, side.wrap, _BOX_COUNT)
+        rims, normals = self.place.place([[0.0], [side.slant]], phi)
+        box = np.concatenate([rims, rims + self.thickness * normals]).reshape(-1, 3)
+        # between two of these the sheet stands out by less than half the way around
+        slack = distance + 0.5 * phi[1] * (max(side.radius1, side.radius2) + self.thickness)
+        close = ((points > box.min(axis=0) - slack) & (points < box.max(axis=0) + slack)).all(axis=1)
+        close[close] = self.distances(points[close]) <= distance
+        return np.asarray(close)
 
 
 @dataclass(frozen=True, eq=False)
