@@ -114,7 +114,7 @@ def bound(mesh: Mesh, sheets: int) -> tuple[float, int]:
     link = SampledLink(mesh, rays, hull, hull, None, axes)
     surveys = survey_axes(link, wanted)
     stage = FineStage(link, surveys, wanted)
-    loose, alone = stage.loose, stage.alone
+    loose, alone = wanted.loose, stage.alone
     singles = [Choice(number, one) for number, plans in enumerate(alone) for one in plans]
     singles.sort(key=lambda choice: -choice.plan.score(loose))
     packings = [grown([start], surveys, alone, loose) for start in starts_apart(singles)]

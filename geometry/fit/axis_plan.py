@@ -131,6 +131,12 @@ class SheetRequirements(FitOptions):
     def __post_init__(self) -> None:
         """Check nothing: a search looks beyond the limits too."""
 
+    @property
+    def loose(self) -> SheetRequirements:
+        """Requirements for coarse profiles, on which a sheet may seem a little worse than it is."""
+        length, wrap = 0.75 * self.min_length, 0.92 * self.min_wrap
+        return replace(self, tolerance=1.1 * self.tolerance, min_length=length, min_wrap=wrap)
+
     def least_radius(self, wrap: float) -> float:
         """Return the smallest radius [m] of a side at least so wide [rad]; its fit may lie a tolerance inside."""
         return max(self.min_radius, self.min_arc / wrap + self.tolerance) if self.min_arc else self.min_radius
@@ -152,6 +158,12 @@ class AxisPlan:
     def area(self) -> float:
         """Area of all sheets, by the weights of the profile [m2]."""
         return sum(side.area(self.profile) for side in self.sides)
+
+    @property
+    def kinds(self) -> tuple[int, int]:
+        """Numbers of full and of partial wraps."""
+        full = sum(side.columns == len(self.profile.phi) for side in self.sides)
+        return full, len(self.sides) - full
 
     def score(self, requirements: SheetRequirements) -> float:
         """Return the area, less what each sheet has to add to be worth its wires [m2]."""
@@ -247,6 +259,9 @@ def largest_partial_wrap(
         worth = None if requirements.weights is None else profile.weight
         region = _largest_region(good, rows, columns, exact, worth)
         if region is None:
+            continue
+        cells = region.columns * float(line[region.first : region.end].sum())
+        if worth is None and cells * profile.step * math.tau / around * math.hypot(1.0, slope) < _MIN_CELL_SHARE * area:
             continue
         side = fit_side(profile, *region, requirements.tolerance, rise)
         if side.end - side.first >= rows and side.area(profile) > area:

@@ -25,7 +25,7 @@ from coneskin.geometry.ray_casting import RayCaster
 
 from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import MOST_TOLERANCE, FitOptions
-from .profile import AxisFrame, RadialProfile, measure_profile
+from .profile import AxisFrame, RadialProfile, axes_apart, measure_profile
 from .surface_samples import SurfaceSamples, sample_surface
 from .touch_weights import TouchWeights, exposure_weights
 
@@ -220,7 +220,7 @@ class AxisCandidate:
     cones: tuple[InfiniteCone, ...]
 
 
-def _find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
+def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
     """Find the axes about which a profile is worth measuring, without duplicates.
 
     Args:
@@ -234,23 +234,21 @@ def _find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
             axis = -axis
             cone = cone and InfiniteCone(cone.origin, axis, cone.radius, -cone.half_angle)
         for number, other in enumerate(found):
-            gap = origin - other.origin
-            gap = gap - (gap @ other.axis) * other.axis
-            tilt = float(np.linalg.norm(np.cross(axis, other.axis)))
-            if tilt < _MAX_DUPLICATE_TILT and np.linalg.norm(gap) < _MAX_DUPLICATE_SHIFT:
+            tilt, shift = axes_apart((origin, axis), (other.origin, other.axis))
+            if tilt < _MAX_DUPLICATE_TILT and shift < _MAX_DUPLICATE_SHIFT:
                 if cone is not None and not any(_same_side(cone, known) for known in other.cones):
                     found[number] = replace(other, cones=(*other.cones, cone))
                 return
         found.append(AxisCandidate(origin, axis, (cone,) if cone else ()))
 
-    thinned = samples.subset(np.arange(len(samples)) % max(1, len(samples) // 2000) == 0)
+    thinned = samples.subset(np.arange(len(samples)) % max(1, len(samples) // 3000) == 0)
     for seed, distance in enumerate((max(0.0015, 0.004 * size), 0.001), 2):
         for start in _cone_hypotheses(samples, distance, seed=seed):
             rough = fit_cone(thinned, start, (max(0.006, 0.06 * start.radius),), 0.4, 1e-2)
             for gates in _DISTANCE_GATES if rough is not None else ():
                 cone = rough
                 for gate in gates:
-                    cone = cone and fit_cone(samples, cone, (gate,), precision=1e-3)
+                    cone = cone and fit_cone(thinned, cone, (gate,), precision=1e-3)
                     if cone is not None:
                         add(cone.origin, cone.axis, cone)
     centred = samples.points - samples.points.mean(axis=0)
@@ -377,4 +375,4 @@ def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]
     if weights is not None:
         weights.check_place(hull.points)
     progress("looking for axes")
-    return SampledLink(mesh, rays, hull, counted, weights, _find_axis_candidates(hull))
+    return SampledLink(mesh, rays, hull, counted, weights, find_axis_candidates(hull))

@@ -16,22 +16,29 @@ from coneskin.core.arrays import Floats
 from .axis_plan import AxisPlan, SheetRequirements, SideLine, kept_clear, largest_partial_wrap, plan_sheets
 from .candidates import SampledLink
 from .cone_fit import InfiniteCone
-from .profile import AxisFrame, RadialProfile
+from .profile import AxisFrame, RadialProfile, axes_apart
 from .side import StraightSide
 
 _AXIS_STEPS = (0.0006, 0.0003, 0.00015)  # m; of the surface, by a shift or by a tilt, one after another
 _MAX_ROUNDS = 4  # at one step
 _LOOSE_FACTOR = 1.6  # times the tolerance, where nothing fits within it
 _ENOUGH_SHARE = 0.97  # of the sheet within the looser tolerance; more is hardly to be found
+_LEAST_BETTER = 1.01  # times the area about the axis from which the search begins
 _RADIUS_BIN = 0.0005  # m; of the histogram of radii
 _MAX_PEAKS = 3  # radii tried for each slope
 _LINE_BINS = 4  # least distance between two of them: 2 mm
 
 
-def _search_axis(
+def search_axis(
     profile: RadialProfile, side: StraightSide, lines: list[SideLine], requirements: SheetRequirements
 ) -> AxisFrame | None:
     """Return an axis about which a single sheet covers more; None where none is found.
+
+    Args:
+        profile: the hull about the axis from which the search begins.
+        side: on that profile, near which a sheet is looked for.
+        lines: straight sides near which partial wraps are looked for besides.
+        requirements: on the sheet.
 
     The axis is shifted and tilted in steps that become smaller. A small shift s and tilt t change the radii by
     (s + t (z + r dr/dz)) cos(phi) (``refine_axis``), so no ray is cast.
@@ -59,7 +66,7 @@ def _search_axis(
 
     here = np.zeros(4)
     start = best = worth(here)
-    if start[0] >= _ENOUGH_SHARE * side.area(profile):
+    if start[0] > 0.0 and start[0] >= _ENOUGH_SHARE * area(profile, loose):
         return None
     for step in _AXIS_STEPS:
         for _ in range(_MAX_ROUNDS):
@@ -72,7 +79,7 @@ def _search_axis(
                         break
             if best <= (1.01 * before[0], 1.01 * before[1]):
                 break
-    if best <= (1.02 * start[0], start[1]):
+    if best <= (_LEAST_BETTER * start[0], start[1]):
         return None
     tilt = here[2:] / reach
     columns = profile.frame.columns
@@ -111,16 +118,10 @@ class AxisSurvey:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Sheets about one axis in a packing: number of the axis, and of full and partial wraps, with the coarse sides."""
+    """Sheets about one axis in a packing: number of the axis, and the coarse plan."""
 
     axis: int
     plan: AxisPlan
-
-    @property
-    def kinds(self) -> tuple[int, int]:
-        """Numbers of full and of partial wraps."""
-        full = sum(side.columns == len(self.plan.profile.phi) for side in self.plan.sides)
-        return full, len(self.plan.sides) - full
 
 
 def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[AxisSurvey]:
@@ -131,6 +132,27 @@ def survey_axes(link: SampledLink, requirements: SheetRequirements) -> list[Axis
         profile = link.profile(frame, _COARSE_GRID, requirements.max_bridge)
         surveys.append(AxisSurvey(profile, _side_lines(profile, candidate.cones)))
     return surveys
+
+
+def survey_about(link: SampledLink, plan: AxisPlan, requirements: SheetRequirements) -> AxisSurvey:
+    """Measure a coarse profile about the axis of a plan, whose sides are among its lines."""
+    frame = plan.profile.frame
+    cones = (InfiniteCone(frame.origin, frame.axis, side.radius, math.atan(side.slope)) for side in plan.sides)
+    profile = link.profile(frame, _COARSE_GRID, requirements.max_bridge)
+    return AxisSurvey(profile, _side_lines(profile, tuple(cones)))
+
+
+def widest_side(plan: AxisPlan, profile: RadialProfile) -> StraightSide:
+    """Return the side of a plan that covers most, on another profile about the same axis."""
+    side = max(plan.sides, key=lambda side: side.area(plan.profile))
+    rows, columns = (len(a) / len(b) for a, b in ((profile.z, plan.profile.z), (profile.phi, plan.profile.phi)))
+    return replace(
+        side,
+        first=round(rows * side.first),
+        end=round(rows * side.end),
+        column=round(columns * side.column),
+        columns=min(len(profile.phi), round(columns * side.columns)),
+    )
 
 
 def _side_lines(profile: RadialProfile, cones: tuple[InfiniteCone, ...]) -> list[SideLine]:
@@ -166,7 +188,8 @@ def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: S
         surveys: of the axes, as ``survey_axes`` returns them.
         requirements: on the sheets.
     """
-    near = replace(requirements, tolerance=_PROMISING_FACTOR * requirements.tolerance)
+    coarse = replace(requirements.loose, tolerance=requirements.tolerance)
+    near = replace(coarse, tolerance=_PROMISING_FACTOR * requirements.tolerance)
     alone = [(plan, one) for one in surveys for plan in plan_sheets(one.profile, one.lines, near, 1)]
     found: list[AxisSurvey] = []
     kept: list[AxisFrame] = []
@@ -176,7 +199,7 @@ def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: S
             continue
         kept.append(frame)
         (side,) = plan.sides
-        better = _search_axis(one.profile, side, one.lines, requirements)
+        better = search_axis(one.profile, side, one.lines, coarse)
         if better is not None:
             profile = link.profile(better, _COARSE_GRID, requirements.max_bridge)
             moved = float((better.origin - frame.origin) @ frame.axis)
@@ -187,9 +210,8 @@ def better_surveys(link: SampledLink, surveys: list[AxisSurvey], requirements: S
 
 def _beside(frame: AxisFrame, other: AxisFrame) -> bool:
     """Tell whether two axes are so near each other that a search from one finds what it finds from the other."""
-    gap = frame.origin - other.origin
-    tilt = float(np.linalg.norm(np.cross(frame.axis, other.axis)))
-    return tilt < _SAME_AXIS[0] and float(np.linalg.norm(gap - (gap @ other.axis) * other.axis)) < _SAME_AXIS[1]
+    tilt, shift = axes_apart((frame.origin, frame.axis), (other.origin, other.axis))
+    return tilt < _SAME_AXIS[0] and shift < _SAME_AXIS[1]
 
 
 def packings(
@@ -213,7 +235,7 @@ def packings(
             continue
         seen.append(start)
         packing = grown([start], surveys, alone, requirements)
-        key = frozenset((choice.axis, choice.kinds) for choice in packing)
+        key = frozenset((choice.axis, choice.plan.kinds) for choice in packing)
         if key not in found or _score(packing, requirements) > _score(found[key], requirements):
             found[key] = packing
     return sorted(found.values(), key=lambda packing: -_score(packing, requirements))

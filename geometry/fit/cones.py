@@ -18,11 +18,20 @@ from coneskin.geometry.mesh import Mesh
 
 from .axis_plan import AxisPlan, FittedSheet, SheetRequirements, SideLine, fitted_sheet, kept_clear, plan_sheets
 from .bare_areas import BareArea, bare_areas, hull_note
-from .candidates import SampledLink, sample_link
-from .coarse_packing import AxisSurvey, Choice, better_surveys, packings, survey_axes
+from .candidates import SampledLink, find_axis_candidates, sample_link
+from .coarse_packing import (
+    AxisSurvey,
+    Choice,
+    better_surveys,
+    packings,
+    search_axis,
+    survey_about,
+    survey_axes,
+    widest_side,
+)
 from .cone_fit import InfiniteCone, fit_cone
 from .fit_options import MOST_TOLERANCE, FitOptions, check_names
-from .profile import AxisFrame, RadialProfile
+from .profile import AxisFrame, RadialProfile, axes_apart
 from .side import StraightSide, facet_offset
 from .touch_weights import TouchWeights
 
@@ -77,8 +86,13 @@ def refine_axis(profile: RadialProfile, sides: list[StraightSide], tolerance: fl
 
 
 _FINE_GRID = (512, 149)  # slices, and rays in each; odd for the same reason
-_FINE_PACKINGS = 6  # packings made anew on fine profiles
+_FINE_PACKINGS = 3  # packings made anew on fine profiles
 _LAST_TRIES = 12  # sheets that are tried where no packing is within the tolerance on fine profiles
+_LEAST_RISE = 1.002  # times what plans are worth, below which others are no better
+_MAX_EXCHANGES = 4  # of a plan for others
+_PROMISING_SHARE = 0.9  # of what plans cover; others that cover less at once are given up
+_LEAST_BARE = 100  # samples, from which axes are looked for
+_KNOWN_AXIS = (0.0005, 5e-5)  # rad, m
 _MAX_COMPLETIONS = 3  # further sheets that are tried on fine profiles, where a plan has fewer than it may have
 
 
@@ -88,7 +102,7 @@ class FineStage:
 
     Attributes:
         link: the link.
-        surveys: of its axes, as ``survey_axes`` returns them.
+        surveys: of its axes, as ``survey_axes`` returns them; the search adds those that it meets.
         requirements: on the sheets.
         alone: coarse plans about each axis by itself, of one sheet, two sheets ... (``plan_sheets``).
     """
@@ -98,28 +112,93 @@ class FineStage:
     requirements: SheetRequirements
     alone: list[list[AxisPlan]] = field(init=False, repr=False)
     _first: dict[tuple[int, tuple[int, int]], AxisPlan | None] = field(default_factory=dict, repr=False)
+    _best_near: set[AxisPlan] = field(default_factory=set, repr=False)
 
     def __post_init__(self) -> None:
-        most = self.requirements.max_sheets
-        alone = [plan_sheets(one.profile, one.lines, self.loose, most) for one in self.surveys]
-        object.__setattr__(self, "alone", alone)
+        object.__setattr__(self, "alone", [self._plans_about(one) for one in self.surveys])
 
-    @property
-    def loose(self) -> SheetRequirements:
-        """Requirements for coarse profiles, on which a sheet may seem a little worse than it is."""
-        wanted = self.requirements
-        return replace(wanted, tolerance=1.1 * wanted.tolerance, min_length=0.75 * wanted.min_length)
+    def _plans_about(self, survey: AxisSurvey) -> list[AxisPlan]:
+        """Return the coarse plans about an axis by itself."""
+        return plan_sheets(survey.profile, survey.lines, self.requirements.loose, self.requirements.max_sheets)
 
     def best_plans(self) -> tuple[AxisPlan, ...]:
         """Return the plans that together cover most, the one that covers most first; none where nothing fits."""
         best: tuple[AxisPlan, ...] = ()
         most = 0.0
-        for packing in packings(self.surveys, self.alone, self.loose)[:_FINE_PACKINGS]:
+        for packing in packings(self.surveys, self.alone, self.requirements.loose)[:_FINE_PACKINGS]:
             plans = self.made(packing)
-            score = sum(plan.score(self.requirements) for plan in plans)
-            if plans and (not best or score > 1.002 * most):
-                best, most = plans, score
-        return self.completed(best)
+            if plans and (not best or self.worth(plans) > _LEAST_RISE * most):
+                best, most = plans, self.worth(plans)
+        return self.improved(self.completed(best))
+
+    def improved(self, axes: tuple[AxisPlan, ...]) -> tuple[AxisPlan, ...]:
+        """Return plans of which one after another gave way to others, as long as these cover more."""
+        if not axes:
+            return axes
+        self._look_beside(axes)
+        axes = self._polished(self.completed(axes))
+        for _ in range(_MAX_EXCHANGES):
+            for one in sorted(axes, key=lambda plan: -plan.area):
+                others = self.completed(tuple(other for other in axes if other is not one))
+                if self.worth(others) > _PROMISING_SHARE * self.worth(axes):
+                    others = self._polished(others)
+                if self.worth(others) > _LEAST_RISE * self.worth(axes):
+                    axes = others
+                    break
+            else:
+                break
+        return tuple(sorted(axes, key=lambda plan: -plan.area))
+
+    def worth(self, axes: Sequence[AxisPlan]) -> float:
+        """Return what plans cover, less what their sheets have to add [m2]."""
+        return sum(plan.score(self.requirements) for plan in axes)
+
+    def _look_beside(self, axes: tuple[AxisPlan, ...]) -> None:
+        """Learn axes of what plans leave bare, and better ones near those that are known."""
+        hull, wanted = self.link.hull, self.requirements
+        bare = np.ones(len(hull), bool)
+        for plan in axes:
+            for side in plan.sides:
+                bare &= ~side.covers(plan.profile, hull, wanted.tolerance)
+        if bare.sum() < _LEAST_BARE:
+            return
+        left = replace(self.link, axes=find_axis_candidates(hull.subset(bare)))
+        for survey in survey_axes(left, wanted):
+            self._learn(survey)
+        clear = [replace(one, profile=kept_clear(one.profile, axes, wanted)) for one in self.surveys]
+        for survey in better_surveys(self.link, clear, wanted):
+            self._learn(survey)
+
+    def _learn(self, survey: AxisSurvey) -> None:
+        """Keep an axis with its plans, unless it is known."""
+        own = survey.profile.frame
+        for known in self.surveys:
+            frame = known.profile.frame
+            tilt, shift = axes_apart((own.origin, own.axis), (frame.origin, frame.axis))
+            if tilt < _KNOWN_AXIS[0] and shift < _KNOWN_AXIS[1]:
+                return
+        self.surveys.append(survey)
+        self.alone.append(self._plans_about(survey))
+
+    def _polished(self, axes: tuple[AxisPlan, ...]) -> tuple[AxisPlan, ...]:
+        """Return plans with better axes near theirs, where there are any."""
+        for one in axes:
+            if one in self._best_near:
+                continue
+            kept, better = one, self._near(one, [other for other in axes if other is not one])
+            if better is not None and better.score(self.requirements) > _LEAST_RISE * one.score(self.requirements):
+                kept = better
+            axes = tuple(kept if other is one else other for other in axes)
+            self._best_near.add(kept)
+        return axes
+
+    def _near(self, plan: AxisPlan, others: Sequence[AxisPlan]) -> AxisPlan | None:
+        """Return the plan about a better axis near that of one, clear of others; None without such an axis."""
+        wanted = self.requirements
+        profile = kept_clear(survey_about(self.link, plan, wanted).profile, others, wanted)
+        lines = [(side.radius, side.slope) for side in plan.sides]
+        frame = search_axis(profile, widest_side(plan, profile), lines, wanted)
+        return None if frame is None else self._fine(frame, lines, plan.kinds, others)
 
     def made(self, packing: list[Choice]) -> tuple[AxisPlan, ...]:
         """Return a packing made anew on fine profiles; nothing where none of it is within the tolerance."""
@@ -155,7 +234,7 @@ class FineStage:
                 break
             survey = self.surveys[number]
             clear = kept_clear(survey.profile, axes, self.requirements)
-            about = plan_sheets(clear, survey.lines, self.loose, 1)
+            about = plan_sheets(clear, survey.lines, self.requirements.loose, 1)
             found += [Choice(number, one) for one in about if one.area > least]
             found.sort(key=lambda choice: -choice.plan.area)
         best: AxisPlan | None = None
@@ -168,18 +247,28 @@ class FineStage:
         return best
 
     def _first_of(self, choice: Choice) -> AxisPlan | None:
-        key = (choice.axis, choice.kinds)
+        key = (choice.axis, choice.plan.kinds)
         if key not in self._first:
             self._first[key] = self._beside(choice, [])
         return self._first[key]
 
     def _beside(self, choice: Choice, done: Sequence[AxisPlan]) -> AxisPlan | None:
         """Return the sheets about one axis on a fine profile, clear of those that are there."""
-        wanted = self.requirements
         lines = [(side.radius, side.slope) for side in choice.plan.sides]
-        profile = self.link.profile(choice.plan.profile.frame, _FINE_GRID, wanted.max_bridge)
-        plan = _fullest(kept_clear(profile, done, wanted), lines, wanted, choice.kinds)
-        return plan and _refined(self.link, plan, wanted, done, choice.kinds)
+        return self._fine(choice.plan.profile.frame, lines, choice.plan.kinds, done)
+
+    def _fine(
+        self, frame: AxisFrame, lines: list[SideLine], kinds: tuple[int, int], done: Sequence[AxisPlan]
+    ) -> AxisPlan | None:
+        """Return the sheets about an axis near some lines, on a fine profile and about the axis that fits them best."""
+        wanted = self.requirements
+        profile = self.link.profile(frame, _FINE_GRID, wanted.max_bridge)
+        plan = _fullest(kept_clear(profile, done, wanted), lines, wanted, kinds)
+        if plan is None:
+            return None
+        plan = _refined(self.link, plan, wanted, done, kinds)
+        self._learn(survey_about(self.link, plan, wanted))
+        return plan
 
 
 def _fullest(

@@ -62,6 +62,16 @@ class AxisFrame:
         return float(z.min()), float(z.max()), math.sqrt(float((x * x + y * y).max()))
 
 
+def axes_apart(frame: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> tuple[float, float]:
+    """Return the angle between two axes [rad, its sine] and how far a point of the first is from the other [m].
+
+    An axis is a point [m] and a unit vector, each of shape (3,).
+    """
+    gap, cosine = frame[0] - other[0], float(frame[1] @ other[1])
+    away = float(gap @ gap) - float(gap @ other[1]) ** 2
+    return math.sqrt(max(0.0, 1.0 - cosine**2)), math.sqrt(max(0.0, away))
+
+
 class Region(NamedTuple):
     """Cells of a profile: rows from ``first`` to before ``end``, and ``columns`` columns from ``column`` on."""
 

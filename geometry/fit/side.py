@@ -316,7 +316,7 @@ def _line(z: Floats, radius: Floats, spread: float) -> tuple[float, float]:
         before = start, slope
         slope = float(weights @ ((z - zm) * (radius - rm)) / (weights @ (z - zm) ** 2))
         start = rm - slope * zm
-        if abs(start - before[0]) < 1e-10 and abs(slope - before[1]) < 1e-9:
+        if abs(start - before[0]) < 1e-8 and abs(slope - before[1]) < 1e-7:
             break
         miss = np.abs(radius - start - slope * z)
         # fillets at the ends must not bias the line: the scale is the spread of the better half

@@ -6,7 +6,7 @@ from dataclasses import replace
 from hashlib import sha256
 from typing import Any
 
-from coneskin.geometry.fit.candidates import SampledLink, _find_axis_candidates
+from coneskin.geometry.fit.candidates import SampledLink, find_axis_candidates
 from coneskin.geometry.fit.cones import LinkFit, fit_cones
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.fit.surface_samples import sample_surface
@@ -22,7 +22,7 @@ def sampled(mesh: Mesh, count: int = 2000) -> SampledLink:
     if key not in _known:
         rays = RayCaster(mesh)
         hull = sample_surface(mesh, rays, count)
-        _known[key] = SampledLink(mesh, rays, hull, hull, None, _find_axis_candidates(hull))
+        _known[key] = SampledLink(mesh, rays, hull, hull, None, find_axis_candidates(hull))
     return _known[key]
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from coneskin.geometry.fit.candidates import _cylinders, _find_axis_candidates, _same_side
+from coneskin.geometry.fit.candidates import _cylinders, _same_side, find_axis_candidates
 from coneskin.geometry.fit.cone_fit import InfiniteCone
 
 from ..synthetic import frustum, rugby, shoulder
@@ -17,7 +17,7 @@ from .axis_cases import hull
 @pytest.mark.long
 def test_candidates_are_told_apart() -> None:
     for body, cones in ((rugby(), 1), (frustum(0.05, 0.05, 0.3), 1), (shoulder(), 2)):
-        found = _find_axis_candidates(hull(body, 2000))
+        found = find_axis_candidates(hull(body, 2000))
         with_cone = [c for c in found if c.cones]
         assert len(with_cone) >= cones
         for one in found:
@@ -53,7 +53,7 @@ def test_the_half_angle_follows_the_direction_of_the_axis() -> None:
     """A cone that narrows along the positive direction keeps a negative half angle, whichever way it was found."""
     for radius in (0.025, 0.03, 0.035, 0.04):
         for ends, sign in (((radius + 0.02, radius), -1.0), ((radius, radius + 0.02), 1.0)):
-            cones = [c.cones[0] for c in _find_axis_candidates(hull(frustum(*ends, 0.2))) if c.cones]
+            cones = [c.cones[0] for c in find_axis_candidates(hull(frustum(*ends, 0.2))) if c.cones]
             assert cones
             angle = math.degrees(cones[0].half_angle)
             assert angle == pytest.approx(sign * math.degrees(math.atan(0.1)), abs=0.01)

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from coneskin.geometry.fit.axis_plan import Region, _largest_region
-from coneskin.geometry.fit.coarse_packing import Choice
+from coneskin.geometry.fit.axis_plan import AxisPlan, Region, _largest_region
 
 Grid = NDArray[np.bool_]
 GRIDS = arrays(bool, array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7), elements=st.booleans())
@@ -103,7 +102,6 @@ def test_more_than_the_grid_is_none(rows: int, columns: int) -> None:
     assert _largest_region(np.ones((6, 10), bool), rows, columns) is None
 
 
-def test_a_choice_counts_its_full_and_its_partial_wraps() -> None:
+def test_a_plan_counts_its_full_and_its_partial_wraps() -> None:
     sides = [SimpleNamespace(columns=columns) for columns in (72, 40, 30)]
-    plan = SimpleNamespace(profile=SimpleNamespace(phi=range(72)), sides=sides)
-    assert Choice(0, plan).kinds == (1, 2)  # type: ignore[arg-type]
+    assert AxisPlan(SimpleNamespace(phi=range(72)), sides).kinds == (1, 2)  # type: ignore[arg-type]
