@@ -79,12 +79,15 @@ def urdf_links(
 class UrdfJoint:
     """A joint: x_parent = origin R(axis, angle) x_child, from lower to upper angle [rad]; one that slides is fixed."""
 
+    name: str
     parent: str
     child: str
     origin: Pose
     axis: Vector
     lower: float
     upper: float
+    limits: tuple[float, float]  #: as the file gives them [rad], over a turn as well; infinite if there are none
+    travel: float  #: of one that slides [m]
 
 
 def urdf_joints(
@@ -103,7 +106,8 @@ def urdf_joints(
         kind, parent, child = joint.get("type", ""), joint.find("parent"), joint.find("child")
         if parent is None or child is None or kind not in ("revolute", "continuous", "fixed", "prismatic"):
             continue
-        name = f"{path}: joint {joint.get('name')}"
+        title = joint.get("name", "")
+        name = f"{path}: joint {title}"
         axis, limit = joint.find("axis"), joint.find("limit")
         way = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"{name}: axis")
         lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
@@ -111,15 +115,18 @@ def urdf_joints(
             lower, upper, _ = _numbers(f"{limit.get('lower', 0)} {limit.get('upper', 0)} 0", f"{name}: limit")
             if not lower <= upper:
                 raise MeshError(f"{name}: the lower limit must not be above the upper, got {lower:g} and {upper:g}")
+        limits, travel = (-math.inf, math.inf) if kind == "continuous" else (lower, upper), 0.0
         length = math.hypot(*way) or 1.0
         unit = way[0] / length, way[1] / length, way[2] / length
-        origin = _origin(joint, f"joint {joint.get('name')}", path)
+        origin = _origin(joint, f"joint {title}", path)
         if kind == "prismatic":
             slid = min(max(0.0, lower), upper)
             origin, lower, upper = origin @ Pose(translation=(slid * unit[0], slid * unit[1], slid * unit[2])), 0.0, 0.0
+            limits, travel = (0.0, 0.0), limits[1] - limits[0]
         elif upper - lower > math.tau:
             lower, upper = -math.pi, math.pi
-        joints.append(UrdfJoint(parent.get("link", ""), child.get("link", ""), origin, unit, lower, upper))
+        ends = parent.get("link", ""), child.get("link", "")
+        joints.append(UrdfJoint(title, *ends, origin, unit, lower, upper, limits, travel))
     children, reached = [joint.child for joint in joints], link_poses(joints, [0.0] * len(joints))
     if stray := {end for joint in joints for end in (joint.parent, joint.child)} - {
         x.get("name") for x in robot.iter("link")
