@@ -88,7 +88,7 @@ HOMES = {
         "src/coneskin/design/link_picture.py",
         "src/coneskin/design/workshop/placement.py",
         "src/coneskin/design/sheets/cable_way.py",
-        "src/coneskin/design/robot_design.py",
+        "src/coneskin/design/cable_lattice.py",
     ),
 }
 #: the live path: no numpy in any of it

@@ -135,6 +135,12 @@ def test_one_scene_takes_the_sensors_of_all_links(
     assert all(part in shopping for part in both), "one list for all sheets"
     assert "| 4-pin wire-to-wire connector, 2.5 mm, plug and socket with 8 crimp contacts | 2 | cable |" in shopping
     assert work.index("| 0 | upper_arm_link") < work.index("| 1 | forearm_link") < work.index("## Yours to decide")
+    cables = data["cables"]["cables"]
+    assert [cable["sensor"] for cable in cables] == [0, 1]
+    assert f"| 1 | forearm_link sheet 1 | {math.ceil(0.1 * cables[1]['length_mm']) / 100:.2f} | elbow |" in top
+    for cable, name in zip(cables, ("upper_arm_link", "forearm_link"), strict=True):
+        lead = tomllib.loads((tmp_path / "skin" / name / "sensor.toml").read_text())["lead_ohm"]
+        assert lead == pytest.approx([1.0 + cable["ohm"]] * 4, abs=1e-3), "switch and cable"
     assert main(["init", "skin", "--simulated", "--arm", "UR5e"]) == 0
     assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
     scene = parse_scene((tmp_path / "scene.toml").read_text(), "scene.toml", tmp_path)

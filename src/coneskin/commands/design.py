@@ -163,7 +163,10 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
         included = "" if count <= design.included else ", not included"
         area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"
         print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{included}")
-    print("\n".join(design.reasons))
+    lengths = (f"{design.cables.length(sensor):.2f}" for sensor, cable in enumerate(design.cables.cables) if cable)
+    print(
+        "\n".join((f"cables to the box at the foot: {', '.join(lengths)} m", *design.cables.reasons, *design.reasons))
+    )
     said = {Path(args.link).name.partition(".")[0].lower(), *(word.lower() for word in common["arguments"].values())}
     model = next((name for name in MODEL_NAMES if name.lower() in said), DEFAULT_MODEL)
     folder = shlex.quote(str(args.output))

@@ -31,6 +31,7 @@ _LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1
 _VIEW_PIXELS = 900  # of a view's longer side
 _GRAZING_SHADE = 0.45  # of the brightness, in a face that the light grazes
 _EDGE_DEPTH = 0.015  # of the size: a step in depth that is drawn as an edge
+_CABLE_STEP = 2e-3  # m; between places of a cable that are drawn
 _OUTLINE_LIFT = 2e-3  # m by which lines stand off a surface, which lies up to the tolerance above a sheet's side
 
 
@@ -257,13 +258,14 @@ def _border(design: SheetDesign) -> tuple[Any, Any, list[tuple[Any, Any]]]:
     return along, around, [*ends, *((along, np.full(len(along), phi)) for phi in (0.0, side.wrap))]
 
 
-def draw_robot(figure: Any, links: Sequence[Mesh], sheets: Sequence[SheetDesign]) -> None:
-    """Draw a robot from two opposite sides with the names of its sheets.
+def draw_robot(figure: Any, links: Sequence[Mesh], sheets: Sequence[SheetDesign], cables: Sequence[Any] = ()) -> None:
+    """Draw a robot from two opposite sides with the names of its sheets and its cables.
 
     Args:
         figure: an empty figure of matplotlib, without a layout engine.
         links: in one pose, in the frame of the robot.
         sheets: in that frame.
+        cables: lines through points in that frame [m], each of shape (n, 3).
     """
     body, owner = _body([*(sheet.outer_triangles() for sheet in sheets), *(mesh.triangles for mesh in links)])
     hues = [_SHEET_COLOURS[index % 4] for index in range(len(sheets))]
@@ -273,6 +275,11 @@ def draw_robot(figure: Any, links: Sequence[Mesh], sheets: Sequence[SheetDesign]
         view = _View(body, way)
         view.draw(axes, lambda hit, _: paints[owner[hit]], way + (0.4, 0.3, 0.5))
         view.draw_frame(axes)
+        for line in cables:
+            gone = np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum()])
+            at = np.arange(0.0, gone[-1], _CABLE_STEP)
+            points = np.stack([np.interp(at, gone, column) for column in line.T], axis=1)
+            view.draw_line(axes, points, np.broadcast_to(view.way, points.shape), color="black", lw=1.2)
         names = []
         for sheet, colour in zip(sheets, hues, strict=True):
             along, around, _ = _border(sheet)

@@ -29,7 +29,9 @@ from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 from coneskin.geometry.urdf import UrdfJoint, link_poses, urdf_joints, urdf_links
+from coneskin.skin.electronics import LeadOhms
 
+from .cable_tree import BEND_RADIUS, BOX_LENGTH, CableRouter, CableSection, CableTree, bundle_radius, loop_length
 from .folder import DESIGN_FILE, FileOptions, _Draft, _measured, _nested, _new_folder, check_target
 from .link_design import LinkDesign, _fit_link, as_built, room_for
 from .report import _table
@@ -37,7 +39,6 @@ from .sheets.cable_way import SphereBody
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
 from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
 
-_WIRES_PER_SHEET = 4
 _SWEEP_SAMPLES = 20_000  # of a link that moves beside another
 _SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
 _SWEEP_CELL = 1.5e-3  # m; along, away from and around the axis
@@ -45,8 +46,11 @@ _SWEEP_REACH = 0.02  # m; beyond a link, where tie and connector look for what c
 _SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
 _SWEEP_ROW = 2e-3  # m; along a sheet
 _LEAST_SLANT = 0.03  # m; a shorter rest of a sheet is not offered
-_POSE_COUNT = 12
 _TOUCH_GRID = (6, 24)  # places of an active area along and around
+_POSE_COUNT = 12
+_WIRES_PER_SHEET = 4
+_TIE_STEP = 0.1  # m; between places at which cables are fixed
+_CUT_STEP = 0.01  # m; cables are cut to multiples of it
 
 
 class _Offer(NamedTuple):
@@ -60,9 +64,6 @@ class _Offer(NamedTuple):
     total: float  #: area that can be touched, with all before [m2]
 
 
-_BuiltSheet = tuple[str, SheetDesign, BuildFigures]  # of a link, with its name before that of the sheet
-
-
 @dataclass(frozen=True, slots=True)
 class RobotDesign:
     """The skin of a robot.
@@ -71,11 +72,16 @@ class RobotDesign:
         offered: all sheets, in the order in which they are included: the curve of touchable area against wires.
         included: how many of them the wires allow.
         reasons: why a link carries none, or its sheets are shortened; one sentence each.
+        cables: of the sheets that are included, which are numbered as their sensors.
     """
 
     offered: tuple[_Offer, ...]
     included: int
     reasons: tuple[str, ...]
+    cables: CableTree
+
+
+_BuiltSheet = tuple[str, SheetDesign, BuildFigures]  # of a link, with its name before that of the sheet
 
 
 def _swept(axis: Pose, points: Floats, lower: float, upper: float, beside: Floats) -> SphereBody:
@@ -110,9 +116,9 @@ def _swept(axis: Pose, points: Floats, lower: float, upper: float, beside: Float
 
 def _swept_beside(
     link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh], skins: Mapping[str, LinkDesign]
-) -> list[SphereBody]:
-    """Return the spaces of the links next to one, and of the sheets that they have already."""
-    spaces = []
+) -> dict[str, SphereBody]:
+    """Return the spaces of the links next to one, and of the sheets that they have already, by their names."""
+    spaces = {}
     for joint in joints:
         other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
         if other is None or other not in meshes:
@@ -127,7 +133,7 @@ def _swept_beside(
             axis, moved, ends = parent, child.inverse().apply_all(points), (joint.lower, joint.upper)
         else:
             axis, moved, ends = child, parent.inverse().apply_all(points), (-joint.upper, -joint.lower)
-        spaces.append(_swept(axis, moved, *ends, axis.inverse().apply_all(meshes[link].vertices)))
+        spaces[other] = _swept(axis, moved, *ends, axis.inverse().apply_all(meshes[link].vertices))
     return spaces
 
 
@@ -214,7 +220,7 @@ def design_robot(
     beside: dict[str, list[SphereBody]] = {}
     skins: dict[str, LinkDesign] = {}
     for name, design in found.items():
-        beside[name] = _swept_beside(name, joints, meshes, skins)
+        beside[name] = list(_swept_beside(name, joints, meshes, skins).values())
         progress(f"{name}: placing sheets, tabs and cables beside what moves")
         sheets = () if design.fit is None else design.fit.sheets
         cleared = [_clear(sheet, options.stack.thickness, beside[name]) for sheet in sheets]
@@ -237,17 +243,24 @@ def design_robot(
             f"{robot}: {len(offered)} sheets are possible, {wires} wires allow none: a sheet has {_WIRES_PER_SHEET}. "
             + "; ".join(reasons)
         )
+    chosen: dict[str, LinkDesign] = {}
+    for name, design in found.items():
+        wanted = {one.number for one in offered[:included] if one.link == name}
+        if len(wanted) < len(design.sheets):
+            places = {k: kept for k, one in enumerate(design.sheets, 1) if k in wanted and (kept := one.found)}
+            design = _assembled(design, places, options, beside[name])
+        if design.sheets:
+            chosen[name] = design
+    progress("laying the cables")
+    on_links = [(name, sheet) for name, design in chosen.items() for sheet in design.sheets]
+    tree = CableRouter(joints, meshes, on_links, lambda link: _swept_beside(link, joints, meshes, chosen)).tree()
     with _new_folder(Path(folder), replace) as draft:
-        result = RobotDesign(tuple(offered), included, tuple(reasons))
+        result = RobotDesign(tuple(offered), included, tuple(reasons), tree)
         built: list[_BuiltSheet] = []
-        for name, design in found.items():
-            wanted = {one.number for one in offered[:included] if one.link == name}
-            if not wanted:
-                continue
-            if len(wanted) < len(design.sheets):
-                places = {k: kept for k, one in enumerate(design.sheets, 1) if k in wanted and (kept := one.found)}
-                design = _assembled(design, places, options, beside[name])
-            figures = _measured(design.sheets, design.mesh, design.frame, len(built))
+        for name, design in chosen.items():
+            skin = tuple(_with_leads(sheet, tree.ohms(k)) for k, sheet in enumerate(design.sheets, len(built)))
+            design = dataclasses.replace(design, sheets=skin)
+            figures = _measured(skin, design.mesh, design.frame, len(built))
             design.written(
                 draft / name,
                 f"{robot}#{name}",
@@ -257,7 +270,7 @@ def design_robot(
                 first_sensor=len(built),
                 figures=figures,
             )
-            for sheet, item in zip(design.sheets, figures, strict=True):
+            for sheet, item in zip(skin, figures, strict=True):
                 built.append((name, dataclasses.replace(sheet, name=f"{name} {sheet.name}"), item))
         progress("drawing and writing what holds for the robot")
         if pictures:
@@ -269,12 +282,25 @@ def design_robot(
             drawn = [
                 dataclasses.replace(sheet, place=sheet.place.moved(poses.get(name, Pose()))) for name, sheet, _ in built
             ]
-            _draw_file(draft / "robot.png", (10, 9), draw_robot, links, drawn)
+            lines = [
+                np.concatenate(
+                    [poses.get(part.place, Pose()).apply_all(part.points) for part in sections if not part.limits]
+                )
+                for sections in tree.cables
+                if sections
+            ]
+            _draw_file(draft / "robot.png", (10, 9), draw_robot, links, drawn, lines)
             names = [f"{one.link} {one.number}" for one in offered]
             steps = [(one.wires, one.total) for one in offered]
             _draw_file(draft / "curve.png", (8, 4.5), draw_curve, steps, names, included)
         _write_robot(draft, result, built, str(robot), files or FileOptions(), pictures)
     return result
+
+
+def _with_leads(sheet: SheetDesign, ohms: float) -> SheetDesign:
+    """Return a sheet whose wires have a further resistance, as far as its board [ohm]."""
+    leads = LeadOhms(*(lead + ohms for lead in sheet.electronics.lead_ohms))
+    return dataclasses.replace(sheet, electronics=dataclasses.replace(sheet.electronics, lead_ohms=leads))
 
 
 def _clear(fit: FittedSheet, thickness: float, beside: Sequence[SphereBody]) -> FittedSheet | None:
@@ -330,7 +356,7 @@ def _touchable(
 def _write_robot(
     folder: Path, design: RobotDesign, built: Sequence[_BuiltSheet], robot: str, files: FileOptions, pictures: bool
 ) -> None:
-    """Write what holds for the robot: its report, its parts on beds together, and the list of its files."""
+    """Write what holds for the robot: its report, its parts on beds together, its cables, and the list of its files."""
     draft = _Draft(folder)
     sheets, figures = [sheet for _, sheet, _ in built], [item for _, _, item in built]
     beds, larger = _nested(sheets, files)
@@ -345,7 +371,7 @@ def _write_robot(
         connector = f"{in_mm(sheet.way.connector_length)} from {side_name(sheet.way.side)}"
         guides.append((str(number), sheet.name, f"[report]({link}/report.md)", connector))
     head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
-    robot_picture = "![The robot with its sheets from two sides.](robot.png)"
+    robot_picture = "![The robot with its sheets and cables from two sides.](robot.png)"
     curve = "![Touchable area against wires; what is included is filled.](curve.png)"
     lines = [
         f"# Skin of {Path(robot).name}",
@@ -360,21 +386,87 @@ def _write_robot(
         *("", "## Everything to buy or to cut", ""),
         "For all sheets together; each report has the list of its link.",
         "",
-        *_table(("item", "quantity", "for"), bill_of_materials(sheets, figures, beds)),
+        *_table(("item", "quantity", "for"), [*bill_of_materials(sheets, figures, beds), *_cable_items(design.cables)]),
         *("", "## Order of work", ""),
         "Cut all parts, finish every sheet on the bench, then wrap link after link in this order, each by its guide.",
         "",
         *_table(("sensor number", "sheet", "guide", "connector, along the cable"), guides),
+        *("", "## Boards and cables", ""),
+        *_cable_section(design.cables, sheets),
         *("", "## Yours to decide", ""),
-        "* Where the boards sit: each sheet has one of its own, and this design ends at its connector. On the link of "
-        f"its sheet, no more than the board's cable crosses joints; at the base, {_WIRES_PER_SHEET} wires do.",
-        "* How each cable passes the joints between connector and board, with slack for their whole range.",
-        "* Whether links two joints away, or what slides, come to a sheet: this was not looked at. Sheets, tabs, ties "
-        "and cables are clear of the links beside theirs, over the whole range of the joint between, and sheets of "
-        "each other.",
+        "* How you guide the loops, so that they catch nothing. They were not checked against what passes by.",
+        "* Where the box stands. A board on its link would need a USB cable past each joint.",
+        "* Whether links two joints away, or what slides, come to a sheet or a cable: this was not looked at. Sheets, "
+        "tabs, ties and cables are clear of the links beside theirs, over the whole range of the joint between, and "
+        "sheets of each other.",
     ]
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     written = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
     links = list(dict.fromkeys(link for link, _, _ in built))
-    data = {"robot": robot, "links": links, "files": [*written, DESIGN_FILE]}
+    data = {"robot": robot, "links": links, "cables": design.cables.as_data(), "files": [*written, DESIGN_FILE]}
     (folder / DESIGN_FILE).write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+
+
+def _cut(length: float) -> float:
+    """Return a length to which a cable is cut [m]."""
+    return math.ceil(length / _CUT_STEP - 1e-9) * _CUT_STEP
+
+
+def _cable_items(tree: CableTree) -> list[tuple[str, str, str]]:
+    """Return what the cables need: item, quantity, what it is for."""
+    lengths = {sensor: _cut(tree.length(sensor)) for sensor, cable in enumerate(tree.cables) if cable}
+    if not lengths:
+        return []
+    on_links = math.fsum(section.length for section, _ in tree.bundles() if section.limits is None)
+    each = ", ".join(f"sensor {sensor}: {length:.2f} m" for sensor, length in lengths.items())
+    return [
+        ("cable of four stranded wires 0.14 mm2, at most 4 mm thick", f"{sum(lengths.values()):.2f} m in all", each),
+        ("label with a sensor number", f"{2 * len(lengths)}", "both ends of each cable"),
+        ("self-adhesive cable-tie mount and cable tie", f"{math.ceil(on_links / _TIE_STEP)}", "cables on bare links"),
+    ]
+
+
+def _cable_section(tree: CableTree, sheets: Sequence[SheetDesign]) -> Iterator[str]:
+    """Yield the lines on boards and cables."""
+    yield "All boards sit in one box at the foot of the robot, so no USB cable passes a joint. The four wires of each"
+    yield "sheet run as one cable from its connector to the box. Mark both of its ends with the sensor number."
+    yield ""
+    rows = []
+    for sensor, cable in enumerate(tree.cables):
+        joints = ", ".join(section.place for section in cable if section.limits) or "none"
+        length = f"{_cut(tree.length(sensor)):.2f}"
+        own = [length, joints, f"{tree.ohms(sensor):.2f}"] if cable else ["yours to lay", "", ""]
+        rows.append([str(sensor), sheets[sensor].name, *own])
+    yield from _table(("sensor number", "sheet", "cable [m]", "joints passed", "each wire [ohm]"), rows)
+    yield ""
+    yield f"Lengths include {in_mm(BOX_LENGTH)} from the foot to the box. `lead_ohm` in `sensor.toml` has the ohms."
+    yield "Cables that go the same way are tied together. On a link the longest of them is given."
+    yield ""
+    rows = []
+    for section, sensors in tree.bundles():
+        what = f"loop past {section.place}" if section.limits else section.place
+        wires = f"{len(sensors)}, {_WIRES_PER_SHEET * len(sensors)}"
+        numbers = ", ".join(map(str, sensors))
+        rows.append([what, in_mm(section.length), numbers, wires, in_mm(2.0 * bundle_radius(len(sensors)))])
+    yield from _table(("where", "length", "sensor numbers", "cables, wires", "bundle's diameter"), rows)
+    yield ""
+    yield f"* Fix the cables every {in_mm(_TIE_STEP)}, with mounts on a link, with tape on a sheet."
+    yield "* Over a sheet they lie only where nothing senses, as beside its seam. `design.json` has the ways."
+    yield "* No tie goes around a sheet. It would press as a touch does."
+    yield "* A loop goes around its joint, and is long enough over the whole range."
+    yield f"* Fix both ends of a loop, and bend it no tighter than {in_mm(BEND_RADIUS)}."
+    for section, _ in tree.bundles():
+        yield from _winding(section)
+    yield from (f"* {reason}" for reason in tree.reasons)
+
+
+def _winding(section: CableSection) -> Iterator[str]:
+    """Yield what a joint that turns by more than half a turn each way does to its loop."""
+    lower, upper = section.limits or (0.0, 0.0)
+    if math.isinf(upper - lower):
+        yield f"* {section.place} has no limits. Its loop is for +-180 deg: set these limits in the controller."
+    elif upper - lower > math.tau + 1e-6:
+        turn = f"{math.degrees(upper - lower):.0f} deg"
+        shorter = in_mm(float(loop_length(section.points[0], section.points[1], (-math.pi, math.pi))))
+        yield f"* {section.place} turns by {turn} and winds its cables up. Limits of +-180 deg in the controller"
+        yield f"  would shorten the loop to {shorter}."

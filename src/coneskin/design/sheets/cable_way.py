@@ -92,6 +92,10 @@ class SphereBody:
 
         return cKDTree(self.points)
 
+    def distances(self, points: Floats) -> Floats:
+        """Return the distance of points, shape (n, 3) [m], from the spheres; infinite where there are none."""
+        return np.asarray(self._tree.query(points)[0] - self.radius)
+
     def near(self, points: Floats, distance: float) -> Bools:
         """Return whether each point is nearer than a distance to a sphere."""
         return np.asarray(np.isfinite(self._tree.query(points, distance_upper_bound=self.radius + distance)[0]))

@@ -144,6 +144,7 @@ adc_v = {parts.adc_volts!r}
 adc_bits = {parts.adc_bits}
 pulldown_ohm = {parts.pulldown_ohms!r}
 current_full_scale_ma = {_round(1e3 * parts.current_full_scale)!r}
+lead_ohm = {[_round(ohms) for ohms in parts.lead_ohms]!r}  # wire and switch of A, B, C, D
 
 # of the conductive layers, per square: measure yours, because the normal drive currents follow from them
 upper_sheet_ohm = {design.conductive[0].ohms!r}
