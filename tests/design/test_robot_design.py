@@ -69,6 +69,12 @@ def test_a_joint_has_its_place_its_unit_axis_and_no_more_than_a_turn(tmp_path: P
     assert (joint.lower, joint.upper) == (-math.pi, math.pi)
 
 
+@pytest.mark.parametrize(("wires", "share"), [(4, 0.5), (None, 0.0), (None, 1.1), (None, math.nan)])
+def test_a_share_is_one_and_excludes_wires(tmp_path: Path, wires: int | None, share: float) -> None:
+    with pytest.raises(GeometryError, match="a share is above 0 % and at most 100 %, and excludes wires"):
+        design_robot(tmp_path / "arm.urdf", tmp_path / "out", wires, share=share)
+
+
 def test_a_robot_of_which_a_link_cannot_be_read_is_refused(tmp_path: Path) -> None:
     robot = write_robot(tmp_path, 0.1)
     (tmp_path / "first.stl").unlink()
@@ -104,6 +110,10 @@ def test_the_wires_buy_the_largest_sheets_and_none_meets_what_turns_beside_it(tm
         turned = Pose.from_rotation_vector((0.0, 0.0, float(turn))).apply_all(corners)
         assert not body.near(turned, 2e-3).any(), "the sheet ends before the way of the stop"
     assert any("shortened to clear the next link" in reason for reason in design.reasons)
+    wanted = design.offered[0].total / design.offered[1].total
+    for share, count in ((wanted, 1), (wanted + 0.01, 2), (1.0, 2)):
+        cheapest = design_robot(robot, out, share=share, pictures=False, max_sheets=1, replace=True)
+        assert cheapest.included == count, share
     with pytest.raises(GeometryError, match="2 sheets are possible, 3 wires allow none: a sheet has 4"):
         design_robot(robot, tmp_path / "none", 3, pictures=False, max_sheets=1)
     assert not (tmp_path / "none").exists()

@@ -4,6 +4,7 @@ examples:
   coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
   coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
   coneskin design arm.urdf --wires 24 -o skins         all links of a robot: the sheets that 24 wires allow
+  coneskin design arm.urdf --share-percent 90 -o skins the fewest sheets with 90 % of the area that can be touched
   coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
@@ -62,7 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("link", metavar="LINK", nargs="?", help="mesh file or FILE.urdf#LINK; leave it out and give radii instead")
     add("-o", "--output", metavar="DIR", required=True, type=Path, help="folder to create; --force replaces one")
     add("--force", action="store_true", help="replace an earlier design in that folder")
-    add("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): as many sheets as N wires allow, 4 each")
+    robot = parser.add_mutually_exclusive_group().add_argument
+    robot("--wires", type=int, metavar="N", help="of a whole robot (FILE.urdf): the sheets that N wires allow, 4 each")
+    share_help = "of a whole robot: as few sheets as reach P %% of the area that can be touched on all of them"
+    robot("--share-percent", type=float, metavar="P", help=share_help)
     add("--json", action="store_true", help="print the design as JSON")
     add("--no-pictures", action="store_true", help="write the report without pictures")
     add("--options", type=Path, metavar="FILE", help="options of the design in a TOML file")
@@ -125,7 +129,7 @@ def _run(args: argparse.Namespace, look: Callable[[], None]) -> int:
         "replace": args.force,
         "progress": say,
     }
-    if args.wires is not None:
+    if args.wires is not None or args.share_percent is not None:
         return _design_robot(args, common | search)
     link: str | Sequence[PlacedFrustum]
     if args.link is None:
@@ -157,8 +161,10 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
     from coneskin.design.robot_design import design_robot
 
     if not (args.link or "").lower().endswith((".urdf", ".xacro")):
-        raise GeometryError("--wires is for a whole robot: name its FILE.urdf, without #LINK")
-    design = design_robot(args.link, args.output, args.wires, **common)
+        option = "--share-percent" if args.wires is None else "--wires"
+        raise GeometryError(f"{option} is for a whole robot: name its FILE.urdf, without #LINK")
+    share = None if args.share_percent is None else 0.01 * args.share_percent
+    design = design_robot(args.link, args.output, args.wires, share=share, **common)
     for count, one in enumerate(design.offered, 1):
         included = "" if count <= design.included else ", not included"
         area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"

@@ -178,6 +178,7 @@ def design_robot(
     folder: str | Path,
     wires: int | None = None,
     *,
+    share: float | None = None,
     options: DesignOptions | None = None,
     packages: Mapping[str, str | Path] | None = None,
     arguments: Mapping[str, str] | None = None,
@@ -192,13 +193,18 @@ def design_robot(
     Args:
         robot: a URDF or xacro file.
         folder: to write.
-        wires: at most; None for all sheets.
+        wires: at most; None for as many as it takes.
+        share: of the area that can be touched on all sheets that are possible: as few sheets as reach it are written;
+            None, and no wires, for all of them.
         options, packages, arguments, files, pictures, replace, progress, search: as those of ``design_link``.
 
     Raises:
         MeshError: the file or the mesh of a link cannot be read, or the joints are no tree.
-        GeometryError: no link can carry a sheet, wires allow none, or the folder is in use; nothing is written then.
+        GeometryError: no link can carry a sheet, wires allow none, wires and share are both given, the share is not
+            above 0 and at most 1, or the folder is in use; nothing is written then.
     """
+    if share is not None and not (wires is None and 0.0 < share <= 1.0):
+        raise GeometryError(f"a share is above 0 % and at most 100 %, and excludes wires, got {100.0 * share:g} %")
     options = options or DesignOptions()
     check_target(Path(folder), replace)
     meshes: dict[str, Mesh] = {}
@@ -238,6 +244,9 @@ def design_robot(
         total = area + (offered[-1].total if offered else 0.0)
         offered.append(_Offer(name, number, active, area, _WIRES_PER_SHEET * (len(offered) + 1), total))
     included = len(offered) if wires is None else min(len(offered), wires // _WIRES_PER_SHEET)
+    if share is not None and offered:
+        enough = share * (1.0 - 1e-9) * offered[-1].total  # as a sum, all of it may round to less
+        included = next(count for count, one in enumerate(offered, 1) if one.total >= enough)
     if not included:
         raise GeometryError(
             f"{robot}: {len(offered)} sheets are possible, {wires} wires allow none: a sheet has {_WIRES_PER_SHEET}. "
