@@ -5,10 +5,11 @@
     python -m bench design-assembly --robot arm.urdf SKIN   # a folder of coneskin design arm.urdf --wires N
 
 Each link is designed and written; what is checked is read from its design.json alone. Of a robot, the bodies on each
-link are held against the links beside it as well, every 5 degrees of the joint between. Solids are made of the numbers
-by trimesh and cut with each other by Manifold; against the link, whose mesh is seldom closed, embree's rays decide,
-most of fourteen for each corner. Nothing of the placer is used. Two bodies interfere if they share more than 1 mm3, and
-a body and the link if a corner lies more than 1 mm inside. A side that is not round is laid out by ``Developable``.
+link and the cables to the boards are held against the links beside it as well, every 5 degrees of the joint between.
+Solids are made of the numbers by trimesh and cut with each other by Manifold; against the link, whose mesh is seldom
+closed, embree's rays decide, most of fourteen for each corner. Nothing of the placer is used. Two bodies interfere if
+they share more than 1 mm3, and a body and the link if a corner lies more than 1 mm inside. A side that is not round is
+laid out by ``Developable``.
 
 "covered" is the area of the sheets, "active" that in which a touch is located, both over the hull. The first bounds the
 second for these sheets. The time includes the search and the files.
@@ -303,6 +304,47 @@ def inside(points: np.ndarray, solid: Any) -> np.ndarray:
     return points[((points > solid.bounds[0]) & (points < solid.bounds[1])).all(axis=1)]
 
 
+def bundles_on(link: str, cables: list[dict[str, Any]]) -> Iterator[tuple[int, Any]]:
+    """Yield the straight pieces on a link of the cables to the boards, with their sensors.
+
+    They are as thick as all cables together, but for the first one from a connector, which is a cable by itself.
+    """
+    ways = [
+        (c["sensor"], k, s["points_mm"]) for c in cables for k, s in enumerate(c["sections"]) if s.get("link") == link
+    ]
+    for sensor, section, points in ways:
+        for number, ends in enumerate(itertools.pairwise(points)):
+            radius = CABLE_RADIUS * (1.0 if section == number == 0 else len(ways) ** 0.5)
+            yield sensor, trimesh.creation.cylinder(radius, segment=ends, sections=12)
+
+
+def laid_over(bundles: Sequence[tuple[int, Any]], data: dict[str, Any], link: Any, first: int) -> list[str]:
+    """Return what cables to the boards meet on a link, and over which active areas they lie, in words.
+
+    Args:
+        bundles: their pieces, from the connector on, with their sensors.
+        data: content of the design.json of the link.
+        link: its mesh [mm].
+        first: sensor of its first sheet.
+    """
+    found: dict[str, float] = {}
+    begun: set[int] = set()
+    for sensor, piece in bundles:
+        for number, sheet in enumerate(data["sheets"], first):
+            thickness, patch = sheet["thickness_mm"], sheet["active_patch"]
+            span = (patch["u1_mm"], patch["u2_mm"]), tuple(np.radians([patch["phi1_deg"], patch["phi2_deg"]]))
+            above = "the active area", shell(side_of(sheet), span[0], span[1], (thickness, thickness + 4.0))
+            leaves = sensor == number and sensor not in begun  # from its own connector
+            for what, solid in [above, *(bodies_of(sheet, thickness) if not leaves else ())]:
+                if (volume := shared_volume(piece, solid)) > LEAST_VOLUME:
+                    key = f"bundle {sensor} in {what} {number}"
+                    found[key] = found.get(key, 0.0) + volume
+        if (depth := depth_in_link(np.vstack([piece.vertices, piece.centroid]), link)) > LEAST_DEPTH:
+            found[f"bundle {sensor} in the link"] = depth
+        begun.add(sensor)
+    return [f"{what} ({size:.1f} {'mm' if 'link' in what else 'mm3'})" for what, size in found.items()]
+
+
 def check_robot(robot: Path, skin: Path, **urdf: Any) -> None:
     """Print what interferes on each link of a robot, and with the links beside it and their skins."""
     meshes = {}
@@ -319,8 +361,17 @@ def check_robot(robot: Path, skin: Path, **urdf: Any) -> None:
         ]
         for name, data in designs.items()
     }
-    for name, data in designs.items():
-        found = interferences(data, meshes[name]) + swept(name, skins, joints, meshes)
+    tree = json.loads((skin / "design.json").read_text())
+    first = 0
+    for name, mesh in meshes.items():
+        data = designs.get(name, {"sheets": ()})
+        bundles = list(bundles_on(name, tree["cables"]["cables"]))
+        if not bundles and name not in designs:
+            continue
+        own = [*skins.get(name, ()), *((f"bundle {number}", piece) for number, piece in bundles)]
+        found = interferences(data, mesh) + laid_over(bundles, data, mesh, first)
+        found += swept(name, skins | {name: own}, joints, meshes)
+        first += len(data["sheets"])
         print(f"{name:30s}{len(data['sheets']):7d} sheets  {'; '.join(found)}", flush=True)
 
 
