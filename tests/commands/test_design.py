@@ -139,6 +139,10 @@ def test_a_seam_gap_opens_to_what_was_asked(tmp_path, wrap_deg: float, gap_mm: f
         ([*CYLINDER, "--height-mm", "0"], "height must be above 0 where both radii are equal"),
         ([*CYLINDER, "--radius3-mm", "30"], "a second cone needs both --radius3-mm and --height2-mm"),
         (["nowhere.stl"], "nowhere.stl"),
+        (
+            [*CYLINDER, "--tolerance-mm", "1"],
+            "--tolerance-mm is for a mesh, in which sheets are searched: leave it out",
+        ),
         ([*CYLINDER, "--seam", "0", "0", "0"], "--seam is for a mesh: by its dimensions a link has no directions"),
         (["nowhere.stl", "--radius1-mm", "5"], "a mesh and --radius1-mm cannot go together"),
     ],

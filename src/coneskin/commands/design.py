@@ -187,6 +187,9 @@ def _links_from_dimensions(args: argparse.Namespace, search: dict[str, Any]) -> 
         GeometryError: a dimension is missing or out of range, or an option is for a mesh.
     """
     values = given_keys(args, DOUBLE_CONE_KEYS)
+    for key in _SHORT_KEYS:
+        if getattr(args, key.name) is not None:
+            raise GeometryError(f"{option_name(key)} is for a mesh, in which sheets are searched: leave it out")
     if args.seam is not None or "seam_direction" in search:
         option = "--seam" if args.seam is not None else "search.seam or search.touch_side"
         raise GeometryError(

@@ -98,10 +98,10 @@ class _View:
         axes.axis("off")
         corner = self.low - 0.12 * self.size
         length = max(n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if n == 1 or n <= 0.3 * self.size)
-        end = np.array([self.high[0], corner[1]])
+        end = np.array([max(self.high[0], corner[0] + 0.25 * self.size + length), corner[1]])  # beside the frame
         axes.plot([end[0] - length, end[0]], [end[1]] * 2, color=INK_COLOUR, lw=2.0, solid_capstyle="butt")
         axes.text(end[0] - 0.5 * length, end[1] + 0.015 * self.size, f"{length} mm", ha="center", fontsize=9)
-        axes.set(xlim=(corner[0] - 0.12 * self.size, self.high[0] + 0.05 * self.size))
+        axes.set(xlim=(corner[0] - 0.12 * self.size, end[0] + 0.05 * self.size))
         axes.set(ylim=(corner[1] - 0.12 * self.size, self.high[1] + 0.05 * self.size))
 
     def draw_frame(self, axes: Any) -> None:
