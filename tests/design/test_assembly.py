@@ -165,6 +165,26 @@ def test_a_sheet_without_room_for_wires_is_left_out_with_the_reason() -> None:
         design_sheets(sides[:1], mesh=mesh)
 
 
+def test_a_sheet_that_bars_the_wires_of_a_larger_one_is_left_out() -> None:
+    """The larger one ends at walls, and the tabs at its edges would lie on the smaller one beside it."""
+    mesh = tube(-0.1, 0.2)
+    for height in (-0.001, 0.101):
+        for azimuth in np.radians(np.arange(-10.0, 215.0, 20.0)):
+            mesh = with_block(mesh, float(azimuth), 0.2, height)
+    wide = at(0.0, Frustum(0.05, 0.05, 0.1, math.radians(200.0)))
+    narrow = at(0.01, Frustum(0.05, 0.05, 0.08, math.radians(155.0)), turn=math.radians(202.5))
+    fitted = tuple(FittedSheet(place, 1e-4, 1e-4, 0.0, 0.0, 0.3, 0.3, 0.0) for place in (narrow, wide))
+    designs, (said,) = design_assembly(LinkFit(fitted, None, 1e-3, 0.3, 0.1, (), "", 1), mesh=mesh)
+    assert [design.place.frustum.height for design in designs] == [0.1]
+    assert said == (
+        "no sheet of radii 50.0 and 50.0 mm, height 80.0 mm, wrap 155 deg: "
+        "other sheets, with more active area, take its room"
+    )
+    alone, none = design_assembly(LinkFit(fitted[:1], None, 1e-3, 0.3, 0.1, (), "", 1), mesh=mesh)
+    assert len(alone) == 1
+    assert not none
+
+
 def test_no_sheet_that_was_found_has_little_active_area() -> None:
     short = FittedSheet(at(0.0, Frustum(0.05, 0.05, 0.0124, math.radians(182))), 1e-4, 1e-4, 0.0, 0.0, 0.1, 0.1, 0.0)
     long = FittedSheet(at(0.1, Frustum(0.05, 0.05, 0.1)), 1e-4, 1e-4, 0.0, 0.0, 0.3, 0.3, 0.0)

@@ -231,6 +231,24 @@ def assemble(
         if not choices[index]:
             left_out[index] = next(iter(problems))
             del choices[index]
+    most, placed, refused = _most_active(choices, cleared, thickness, beside)
+    for index in sorted(choices) if refused and found else ():
+        # a sheet may bar the way of the wires of a larger one, which is built in its place
+        others = {other: options for other, options in choices.items() if other != index}
+        active, rest, reasons = _most_active(others, cleared, thickness, beside)
+        if active > most:
+            most, placed, refused = (
+                active,
+                rest,
+                reasons | {index: "other sheets, with more active area, take its room"},
+            )
+    return tuple(placed[index] for index in sorted(placed)), left_out | refused
+
+
+def _most_active(
+    choices: dict[int, list[_Variant]], cleared: Sequence[PlacedFrustum], thickness: float, beside: Sequence[Body]
+) -> tuple[float, dict[int, PlacedSheet], dict[int, str]]:
+    """Return the active area [m2] of the sheets placed in the best order, these by their index, and why not others."""
     orders = list(permutations(choices)) if len(choices) <= _MAX_PERMUTED else [tuple(choices), tuple(choices)[::-1]]
     most, placed, refused = -1.0, dict[int, PlacedSheet](), dict[int, str]()
     for order in orders:
@@ -247,7 +265,7 @@ def assemble(
         active = sum(sheet.layout.active.area(sheet.layout.sheet) for sheet in done.values())
         if active > most:
             most, placed, refused = active, done, reasons
-    return tuple(placed[index] for index in sorted(placed)), left_out | refused
+    return most, placed, refused
 
 
 def _best(index: int, variants: Sequence[_Variant], bodies: Sequence[Body]) -> PlacedSheet | str:
