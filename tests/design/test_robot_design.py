@@ -153,7 +153,9 @@ def test_one_scene_takes_the_sensors_of_all_links(
         assert lead == pytest.approx([1.0 + cable["ohm"]] * 4, abs=1e-3), "switch and cable"
     assert main(["init", "skin", "--simulated", "--arm", "UR5e"]) == 0
     assert "2 sensors on the upper_arm, forearm" in capsys.readouterr().out
-    scene = parse_scene((tmp_path / "scene.toml").read_text(), "scene.toml", tmp_path)
+    text = (tmp_path / "scene.toml").read_text()
+    assert f"# sensor 1: cable of {1e-3 * cables[1]['length_mm']:.2f} m past elbow to the box at the foot" in text
+    scene = parse_scene(text, "scene.toml", tmp_path)
     assert [[item.sensor.sensor_id for item in link.sensors] for link in scene.links] == [[0], [1]]
     for name, number in (("upper_arm_link", 0), ("forearm_link", 1)):
         assert f"| sensor number | {number} |" in (tmp_path / "skin" / name / "report.md").read_text()

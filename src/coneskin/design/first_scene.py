@@ -7,8 +7,10 @@ import math
 import os
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 from pathlib import Path, PurePath
+from typing import Any
 
 from coneskin.core.errors import GeometryError, KinematicsError
 from coneskin.core.files import read_file
@@ -67,6 +69,8 @@ class DesignFolder:
             and has no place on a link.
         thickness: of a sheet with all its layers [m]; None where the design does not say it.
         name: of the link, as the design has it.
+        cables: to the box with the boards at the foot of a robot, in words, in the order of the sensors; empty of a
+            link that was designed alone.
     """
 
     sensor_files: tuple[Path, ...]
@@ -75,6 +79,7 @@ class DesignFolder:
     frame: str | None
     thickness: float | None = None
     name: str = ""
+    cables: tuple[str, ...] = ()
 
 
 def read_designs(folder: Path) -> tuple[DesignFolder, ...]:
@@ -84,10 +89,27 @@ def read_designs(folder: Path) -> tuple[DesignFolder, ...]:
         GeometryError: the folder is no design.
     """
     try:
-        names = [str(name) for name in read_json(read_file(folder / DESIGN_FILE, _MAX_BYTES)).get("links", ())]
-    except (OSError, ValueError, TypeError, AttributeError):
-        names = []
-    return tuple(_read_design(folder / name) for name in names) or (_read_design(folder),)
+        data = read_json(read_file(folder / DESIGN_FILE, _MAX_BYTES))
+        names = [str(name) for name in data.get("links", ())]
+        cables = [_cable_words(cable) for cable in data["cables"]["cables"]] if names else []
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        names, cables = [], []
+    designs, first = [], 0
+    for name in names:
+        design = _read_design(folder / name)
+        end = first + len(design.sensors)
+        designs.append(replace(design, cables=tuple(cables[first:end])))
+        first = end
+    return tuple(designs) or (_read_design(folder),)
+
+
+def _cable_words(cable: Any) -> str:
+    """Return the words on a cable of a robot's design.json."""
+    joints = [str(section["joint"]) for section in cable["sections"] if "joint" in section]
+    if not cable["sections"]:
+        return "its cable is yours to lay"
+    past = f" past {', '.join(joints)}" if joints else ""
+    return f"cable of {1e-3 * float(cable['length_mm']):.2f} m{past} to the box at the foot"
 
 
 def _read_design(folder: Path) -> DesignFolder:
@@ -177,13 +199,15 @@ def first_scene(
     for design, name in zip(designs, names, strict=True):
         title = name or (design.name if len(designs) > 1 else "link")
         lines.append(f'[[link]]\nname = {json.dumps(title)}\nframe = "{design.frame or "mesh"}"\n')
-        for path, sensor in zip(design.sensor_files, design.sensors, strict=True):
+        for path, sensor, cable in zip_longest(design.sensor_files, design.sensors, design.cables):
             file = os.path.relpath(path, target.parent).replace(os.sep, "/")
             lines.append(
                 f"[[link.sensor]]\nfile = {json.dumps(file)}     # its dimensions, pose on the link and electronics"
             )
             if len(designs) > 1:
                 lines.append(f"name = {json.dumps(f'{title} {sensor.name}')}")
+            if cable:
+                lines.append(f"# sensor {number}: {cable}")
             if design.frame is None and arm is not None:
                 lines.append(_middle_of_tube(sensor.frustum, name or "", arm.model))
             if boards:
