@@ -91,7 +91,6 @@ BENCHES = {
     # sheets for links
     "design-map": Bench("bench.design.map", "Links of other shapes."),
     "design-planted": Bench("bench.design.planted", "Real links: the truth is planted."),
-    "design-links": Bench("bench.design.links", "A proven bound: it is the best of many searches."),
     "design-copies": Bench("bench.design.copies", "Links of which a part is missing."),
     "design-room": Bench("bench.design.room", "Axes that the search never looks at."),
     "design-reach": Bench("bench.design.reach", "Whether a person would build each sheet."),

@@ -5,8 +5,11 @@ python -m pip install -e '.[design,cad,bench]'; python -m bench build --links FO
 A link takes a minute or more. A run that was ended goes on with `--resume build.txt > build-2.txt`: the links that are
 whole there are taken over, each with the commit and load of its run.
 
-The links: meshes of the makers' packages that bench `design-links` names, and Universal Robots'
-(Universal_Robots_ROS2_Description 2221ec0, BSD-3) and UFactory's (xarm_ros2 3654ba7, BSD-3).
+The links: meshes of the makers, all of licences that permit it (fetched, not stored here): Franka (franka_description
+b299b39, Apache-2.0), Doosan (doosan-robot ab24968, BSD-3), FANUC (fanuc 8fee5e3, BSD-3), KUKA (kuka_experimental
+e78bbd1, Apache-2.0), ABB (abb 77db19b, BSD-3 and Apache-2.0), Kinova (ros_kortex 6cd75d4, BSD-3), Staubli (staubli
+367d92e, Apache-2.0), Universal Robots (Universal_Robots_ROS2_Description 2221ec0, BSD-3) and UFactory (xarm_ros2
+3654ba7, BSD-3).
 """
 
 from __future__ import annotations
