@@ -55,7 +55,6 @@ class DisplacementMap:
     """A placed frustum and the heights of the mesh over it.
 
     Attributes:
-        placed: the sheet.
         heights: above the side, along its outward normal [m]; rows at equal steps of u from 0 to slant, columns at
             equal steps of phi from 0 to wrap, shape (k, p) with k and p at least 2. Of a full wrap the last column
             repeats the first.
@@ -111,8 +110,6 @@ def measure_displacement(
     """Measure the heights of a mesh over a sheet, by rays along the sheet's normals.
 
     Args:
-        mesh: the link.
-        placed: the sheet.
         along: steps of u.
         around: steps of phi.
         limit: depth beyond which a node lies in a hole [m]; the tolerance of the fit. Heights are clamped to it.

@@ -229,7 +229,6 @@ def roll_up(sector: Sector, wrap: float = 2.0 * math.pi) -> Frustum:
     """Return the frustum that a sector forms when it is wrapped through an angle, the inverse of ``unroll``.
 
     Args:
-        sector: the flat sector.
         wrap: angle about the axis that the sheet covers [rad], in (0, 2 pi].
 
     Raises:

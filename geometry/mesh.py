@@ -244,14 +244,11 @@ def _unit(extent: float, asset: _ColladaAsset | None) -> tuple[str, float, str]:
 def make_mesh(
     vertices: Any, faces: Any, source: str = "mesh", unit: str = "m", notes: list[str] | tuple[str, ...] = ()
 ) -> Mesh:
-    """Weld corners that coincide, drop faces without area and check that the rest can be a link.
+    """Weld corners that coincide, drop faces without area and check that the rest can be a link; words as of `Mesh`.
 
     Args:
         vertices: corners [m], shape (n, 3).
         faces: indices of three corners, shape (m, 3).
-        source: its origin, for messages.
-        unit: the file's unit, for messages.
-        notes: guesses and changes of the reader, one sentence each.
 
     Raises:
         MeshError: a corner that is not finite, an index out of range, or a shape that cannot be a link.

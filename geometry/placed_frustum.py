@@ -27,7 +27,6 @@ class PlacedFrustum:
     """A frustum and its pose on a link.
 
     Attributes:
-        frustum: the shape.
         link_frustum: pose of the frustum's frame in the link's frame.
     """
 

@@ -118,7 +118,6 @@ def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
     Their faces are exact cones, cylinders and planes, so a CAD program measures radii and distances on them.
 
     Args:
-        path: the file.
         layers: at least one.
 
     Raises:

@@ -61,7 +61,6 @@ def urdf_links(
     Args:
         path: a URDF, or a xacro file.
         packages: folders of the ROS packages that a xacro file names.
-        arguments: of a xacro file.
 
     Raises:
         MeshError: no such file, not a URDF, or the name of a link is taken or no name of a folder.
@@ -163,11 +162,9 @@ def load_urdf_link(
 
     Args:
         path: the URDF, or a xacro file, which is expanded.
-        link: name of the link.
         geometry: "visual" or "collision". Collision bodies are often convex hulls that have lost the tube.
         packages: folders of the ROS packages in package:// paths; others are searched for at and beside the folders
             above the URDF.
-        arguments: of a xacro file.
 
     Returns:
         the mesh in the frame of the link [m].

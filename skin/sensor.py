@@ -29,7 +29,6 @@ def sheet_resistances(frustum: Frustum, upper_sheet_ohms: float, lower_sheet_ohm
     """Return the resistances of the untouched sheets between their electrodes, A to B and C to D [ohm].
 
     Args:
-        frustum: the active area.
         upper_sheet_ohms: sheet resistance of the upper layer [ohm per square].
         lower_sheet_ohms: sheet resistance of the lower layer [ohm per square].
 

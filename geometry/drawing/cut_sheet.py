@@ -92,9 +92,7 @@ class CutPart:
     """One piece of material.
 
     Attributes:
-        name: of the part.
         strokes: lines for the cutter, in order: marks, holes, then the border.
-        labels: text on the part.
     """
 
     name: str
@@ -123,7 +121,6 @@ class CutSheet:
         material: material and thickness.
         face: face of the sensor that is up in the drawing.
         surface: cone for which the parts are cut.
-        parts: pieces of the material.
     """
 
     number: int
@@ -171,8 +168,6 @@ def cut_sheets(
     """Draw the seven cut sheets of a sensor.
 
     Args:
-        layout: electrodes, leads, tabs and holes.
-        stack: the layers.
         place: of the sheet, whose side is that of the layout; None for a cone anywhere.
         title: written on every part.
         kerf: width of the cut [m]; borders grow and holes shrink by half of it.

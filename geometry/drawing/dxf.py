@@ -23,14 +23,9 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
     Each sheet has those of the layers <slug>_CUT, _HOLE, _SCORE, _FOLD and _LABEL that it uses.
 
     Args:
-        sheets: the sheets, drawn in their own coordinates.
         arcs: "bulge" for closed polylines with true arcs; "arc-line" for separate LINE and ARC entities, for readers
             that ignore bulges; "flattened" for polylines of straight lines.
         tolerance: largest distance of flattened lines from the arcs [m].
-
-    Returns:
-        the text of the file.
-
     Raises:
         MissingExtra: ezdxf is not installed.
         GeometryError: an unknown style of arcs, or a tolerance that is not above 0.

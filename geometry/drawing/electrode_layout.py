@@ -115,7 +115,6 @@ class SheetLayout:
 
     Attributes:
         sheet: the side of the link that the sheet covers.
-        plan: the widths.
         field: between the electrodes: u1 is the inner edge of B, u2 of A, phi1 of D, phi2 of C. The decoder maps the
             readings 0..1 to it.
         active: area in which a touch is located, inside the field of both sheets.
@@ -159,10 +158,6 @@ class SheetLayout:
 
 def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLayout:
     """Place electrodes, leads, tabs and holes on a sheet.
-
-    Args:
-        sheet: the side of the link that the sheet covers.
-        plan: the widths; the default ones if None.
 
     Raises:
         GeometryError: no active area would remain, or tabs do not fit.

@@ -146,7 +146,6 @@ def snap_to_cylinder(frustum: Frustum, tolerance: float) -> Frustum:
     each end.
 
     Args:
-        frustum: the cone.
         tolerance: of the cut [m]; 0 never snaps.
 
     Returns:

@@ -71,11 +71,9 @@ def part_labels(
     """Place a block of lines in the middle of a sheet, and the names of its four sides.
 
     Args:
-        layout: electrodes and active area of the sheet.
         surface: the cone for which the sheet is cut.
         lines: lines of the block, the most important first; the last ones are left out if all would be too small.
         clear: part of the sheet in which the block has to lie; by default the active area.
-        ends: names of its ends.
     """
     room = layout.active
     free = clear or room
@@ -97,7 +95,6 @@ def strip_label(layout: SheetLayout, surface: Frustum, which: str, face: str, ti
     """Place the name of an electrode, its face and the title along its strip, if the strip is straight enough.
 
     Args:
-        layout: electrodes of the sheet.
         surface: the cone for which the foil is cut.
         which: the electrode, A, B, C or D.
         face: the face that is up.

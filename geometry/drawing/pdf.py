@@ -150,15 +150,6 @@ _BLEED_WIDTH = 4.0  # mm; width printed beyond a window
 
 def to_pdf(sheets: Sequence[CutSheet], page: PageSize = "A4", title: str = "coneskin") -> bytes:
     """Write cut sheets as one PDF: a page map first, then the pages to print.
-
-    Args:
-        sheets: the sheets, drawn in their own coordinates.
-        page: paper size.
-        title: text on every page.
-
-    Returns:
-        the bytes of the file.
-
     Raises:
         GeometryError: an unknown paper size.
     """

@@ -40,7 +40,6 @@ class ShapeTab:
         phi: azimuth of the middle of its foot [rad].
         width: along the side [m].
         length: away from the sheet [m].
-        side: the side from which it extends.
     """
 
     u: float

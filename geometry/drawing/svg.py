@@ -15,15 +15,7 @@ _MAX_ARC_RADIUS = 10.0  # m; beyond it a renderer in single precision misplaces 
 
 
 def to_svg(sheets: Sequence[CutSheet], title: str = "coneskin") -> str:
-    """Write cut sheets as one SVG text.
-
-    Args:
-        sheets: the sheets, drawn in their own coordinates.
-        title: of the document.
-
-    Returns:
-        the text of the file.
-    """
+    """Write cut sheets as one SVG text."""
     x0, y0, x1, y1 = joint_bounds(sheet.bounds for sheet in sheets)
     left, top = x0 - _BORDER_WIDTH, y1 + _BORDER_WIDTH
     width, height = (x1 + _BORDER_WIDTH - left) * 1e3, (top - y0 + _BORDER_WIDTH) * 1e3

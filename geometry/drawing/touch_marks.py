@@ -21,11 +21,7 @@ _NUMBER_HEIGHT = 2e-3  # m; height of a mark's number
 
 
 def mark_parts(side: int = _MARKS_PER_SIDE) -> Iterator[tuple[float, float]]:
-    """Yield the places of a grid as parts along and around, row by row from end 1, each from the end of the one before.
-
-    Args:
-        side: marks along, and around.
-    """
+    """Yield the places of a grid, so many a side, as parts of both; each row from the end of the one before."""
     parts = [_FIRST_SHARE + (_LAST_SHARE - _FIRST_SHARE) * k / (side - 1) for k in range(side)]
     for row, along in enumerate(parts):
         for around in parts if row % 2 == 0 else reversed(parts):
@@ -33,13 +29,7 @@ def mark_parts(side: int = _MARKS_PER_SIDE) -> Iterator[tuple[float, float]]:
 
 
 def marks_on_link(layout: SheetLayout, stack: LayerStack, place: PlacedFrustum) -> tuple[tuple[float, float], ...]:
-    """Return slant distance [m] and azimuth [rad] on the link of each mark, in the order of their numbers.
-
-    Args:
-        layout: of the sheet on its link.
-        stack: the layers.
-        place: side of the link under the sheet.
-    """
+    """Return slant distance [m] and azimuth [rad] on the link of each mark, in the order of their numbers."""
     height, field = stack.middle(_READ_LAYER), layout.field
     read = place.parallel(height)
     first, last = (place.azimuth_above(height, phi) for phi in (field.phi1, field.phi2))

@@ -181,9 +181,7 @@ def plan_sheets(
     """Return the plan that covers most for each number of sheets from 1 on; shorter where more add nothing.
 
     Args:
-        profile: the hull about the axis.
         lines: straight sides near which partial wraps are looked for.
-        requirements: on the sheets.
         count: number of sheets at most.
         rise: added to the radii, because facets lie inside the true surface [m].
         exactly: numbers of full and of partial wraps, to plan no others.
@@ -327,13 +325,7 @@ def _clashing_cells(
 
 
 def kept_clear(profile: RadialProfile, plans: Sequence[AxisPlan], requirements: SheetRequirements) -> RadialProfile:
-    """Return a profile on which no sheet may lie where it would run into those of plans about other axes.
-
-    Args:
-        profile: the hull about an axis.
-        plans: about other axes.
-        requirements: on the sheets.
-    """
+    """Return a profile on which no sheet may lie where it would run into those of plans about other axes."""
     for plan in plans:
         for side in plan.sides:
             cells = _clashing_cells(profile, plan.profile, side, requirements.thickness, requirements.gap)
@@ -419,10 +411,6 @@ def fitted_sheet(
     """Return one side of a plan as a sheet on the link.
 
     Args:
-        plan: about the axis.
-        side: one of its sides.
-        axis: number of the axis.
-        hull: samples of the link.
         tolerance: largest distance between sheet and hull [m].
         seam: direction in which the seam of a full wrap faces, shape (3,).
         worth: what each sample counts, shape (n,); the same for all by default.

@@ -26,8 +26,6 @@ def hull_note(mesh: Mesh, samples: SurfaceSamples, visual: bool = False) -> str:
     The positions of the samples decide, not the volume, which open and wrongly wound meshes do not have.
 
     Args:
-        mesh: the link.
-        samples: of its hull.
         visual: True where the mesh is called the visual one, and is taken for the link.
     """
     from scipy.spatial import ConvexHull, QhullError
@@ -77,7 +75,6 @@ class BareTally:
     """Tally of what sheets leave bare: each reason takes what no earlier one has taken.
 
     Args:
-        hull: samples of the link.
         covered: those that sheets cover, shape (n,).
 
     Attributes:
@@ -120,9 +117,6 @@ def bare_areas(
     Args:
         axes: the sheets, by their axes.
         more: a sheet that could be added if one more were allowed; None where it was looked for in vain.
-        surveys: of all axes.
-        hull: samples of the link.
-        requirements: on the sheets.
     """
     tally = BareTally(hull, _covered(axes, hull, requirements.tolerance))
     take = tally.take

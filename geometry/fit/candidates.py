@@ -221,11 +221,7 @@ class AxisCandidate:
 
 
 def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
-    """Find the axes about which a profile is worth measuring, without duplicates.
-
-    Args:
-        samples: points and normals of the hull.
-    """
+    """Find the axes about which a profile is worth measuring, without duplicates."""
     found: list[AxisCandidate] = []
     size = float(np.ptp(samples.points, axis=0).max())
 
@@ -281,8 +277,6 @@ class SampledLink:
     """A link with all that every search on it needs.
 
     Attributes:
-        mesh: the link.
-        rays: a ray caster of the mesh.
         hull: samples by which sheets are looked for.
         counted: samples by which coverage is measured.
         weights: what areas count; None where all count the same.
@@ -337,8 +331,6 @@ class SampledLink:
         """Measure a profile about an axis, of at most so many slices and so many rays in each.
 
         Args:
-            frame: the axis.
-            grid: slices, and rays in each.
             max_bridge: width of the widest hole that a sheet spans [m].
             weighed: by what areas count.
         """
@@ -351,8 +343,6 @@ def sample_link(mesh: Mesh, options: FitOptions, progress: Callable[[str], None]
     """Sample a link and find its axes; nothing is drawn by chance.
 
     Args:
-        mesh: the link.
-        options: of the search.
         progress: called with the name of each step.
 
     Raises:

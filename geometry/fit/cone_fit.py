@@ -89,7 +89,6 @@ def fit_cone(
     """Fit a cone to the points that lie near it and whose normals agree with its own.
 
     Args:
-        samples: points and normals of the hull.
         start: first guess; some points must lie within the first gate of it.
         gates: distances beyond which a point has no weight [m], decreasing; each is kept until the fit converges.
         angle: between the normals, above which a point has no weight [rad]; twice that at the first of several gates.

@@ -86,7 +86,6 @@ class RadialProfile:
     """Radius of the hull on a grid of heights and azimuths.
 
     Attributes:
-        frame: the axis.
         z: heights of the slices [m], ascending and evenly spaced, shape (k,).
         phi: azimuths [rad], ascending from 0, evenly spaced over the turn, shape (p,).
         radius: distance from the axis to the outermost surface [m], 0 where there is none, shape (k, p).
@@ -161,9 +160,6 @@ def measure_profile(
     """Measure R(z, phi) from end to end of a link.
 
     Args:
-        mesh: the link.
-        rays: a ray caster of the same mesh.
-        frame: axis and azimuth 0.
         step: approximate distance between slices [m].
         around: number of rays in a slice.
         max_bridge: width and length of the widest hole that a sheet spans rather than follows [m].

@@ -34,8 +34,6 @@ def place_seams(fit: LinkFit, mesh: Mesh, weights: TouchWeights | None = None) -
     choice. Where nothing shields any side, the seams stay as well.
 
     Args:
-        fit: of a link.
-        mesh: the link.
         weights: where touches are likely; the free space of a place counts as much as its weight.
 
     Returns:

@@ -274,7 +274,6 @@ def fit_side(
     barrel) and the mean line would lose more than 3 % of the length.
 
     Args:
-        profile: the hull about the axis.
         first: first slice.
         end: slice after the last.
         column: first azimuth.
@@ -349,7 +348,6 @@ def facet_offset(mesh: Mesh, samples: SurfaceSamples, cone: InfiniteCone, tolera
     bodies), and its facets are the better estimate, so the result is 0 unless the corners agree to a fifth of the rise.
 
     Args:
-        mesh: the link.
         samples: points of the hull in the region of the sheet.
         cone: the fitted side.
         tolerance: largest distance of a sample from the side [m].

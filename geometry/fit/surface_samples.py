@@ -101,8 +101,6 @@ def sample_surface(mesh: Mesh, rays: RayCaster, count: int = 6000) -> SurfaceSam
     leaves the link from one of the two sides of its face, and that side gives its normal.
 
     Args:
-        mesh: the link.
-        rays: a ray caster of the same mesh.
         count: about how many points there are before the selection.
 
     Raises:

@@ -131,7 +131,6 @@ def free_shares(points: Floats, normals: Floats, rays: RayCaster) -> Floats:
     Args:
         points: places on a mesh [m], shape (n, 3).
         normals: unit outward normals there, shape (n, 3).
-        rays: a ray caster of the mesh.
     """
     turn = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(_RAY_COUNT)  # the golden angle spreads them evenly
     out = np.sqrt((np.arange(_RAY_COUNT) + 0.5) / _RAY_COUNT)  # evenly over the disc: by the cosine over the hemisphere

@@ -79,7 +79,6 @@ def mass_matrix(model: ArmModel, inertia: ArmInertia, q: Sequence[float]) -> lis
 
     Args:
         model: the nominal arm; the DH frames of a calibrated one may be far from its links.
-        inertia: of the arm.
         q: joint positions [rad].
 
     Raises:
@@ -108,7 +107,6 @@ def joint_torques(
 
     Args:
         model: the nominal arm.
-        inertia: of the arm.
         q: joint positions [rad].
         qd: joint speeds [rad/s].
         qdd: joint accelerations [rad/s^2].
@@ -170,7 +168,6 @@ def held_braking(
     arm stands, and at least `_LEAST_BRAKING`, where a real arm would sag.
 
     Args:
-        name: of the arm's model.
         payload: the most that it carries, taken as a point [kg].
         centre: of the payload, in the flange's frame [m].
 
@@ -210,7 +207,6 @@ def loaded(inertia: ArmInertia, mass: float, centre: Sequence[float]) -> ArmIner
     """Return the inertia of an arm that carries a payload, taken as a point.
 
     Args:
-        inertia: of the bare arm.
         mass: of the payload [kg].
         centre: its centre of mass in the flange's frame [m].
     """

@@ -103,7 +103,6 @@ def place_point(
     """Return where a point that is fixed on a link is, and how the joints move it.
 
     Args:
-        model: the arm.
         q: joint positions [rad].
         link: link that carries the point, 0 (base) to n (flange).
         p_link: point in the DH frame of that link [m].
@@ -321,7 +320,6 @@ def _crossing(model: ArmModel, i: int, start: float) -> tuple[float, float]:
     """Return the point where the axis of the next joint crosses a plane normal to this joint's axis.
 
     Args:
-        model: the arm.
         i: index of the row of the DH table.
         start: position of the plane along this joint's axis, from the origin of the frame before [m].
 

@@ -31,7 +31,6 @@ def blocked_joints(
     """Return the indices of joints that could no longer brake before their limit if they moved as wanted.
 
     Args:
-        model: the arm.
         braking: deceleration available to a joint [rad/s^2].
         q: joint positions [rad].
         qd: present joint speeds [rad/s].
@@ -195,7 +194,6 @@ class Workspace:
     height.
 
     Attributes:
-        model: the arm.
         table: height in the base frame of a horizontal plane below which it must not go [m], or None.
 
     Raises:
@@ -246,7 +244,6 @@ class ArmSweep:
     """Place of the whole arm when a motion began.
 
     Attributes:
-        model: the arm.
         q: joint positions then [rad].
         corners: of its middle line then, in the base frame [m].
     """

@@ -34,7 +34,6 @@ class Deadman:
     Args:
         guard: takes the heartbeat.
         others: further channels whose end ends this process.
-        clock: monotonic seconds.
         end: ends the process at once.
     """
 

@@ -17,11 +17,7 @@ _ONE_NUMBER = struct.Struct("<Q")
 
 
 class StopProgram(NamedTuple):
-    """Command to stop whatever the driver moves, and to refuse the program until ``Release``.
-
-    Attributes:
-        deceleration: of the leading joint [rad/s2].
-    """
+    """Command to stop the arm, at [rad/s2] of the leading joint, and to refuse the program until ``Release``."""
 
     deceleration: float
 
@@ -31,12 +27,7 @@ class StopProgram(NamedTuple):
 
 
 class SetJointVelocity(NamedTuple):
-    """Command to move the joints at these speeds until the next command.
-
-    Attributes:
-        qd: joint speeds [rad/s].
-        acceleration: of the leading joint [rad/s2].
-    """
+    """Command to move at joint speeds [rad/s] until the next one; acceleration of the leading joint [rad/s2]."""
 
     qd: Joints
     acceleration: float
@@ -47,12 +38,7 @@ class SetJointVelocity(NamedTuple):
 
 
 class DatedVelocity(NamedTuple):
-    """Speeds as they are sent to the driver process, which follows none that were held up anywhere.
-
-    Attributes:
-        decided: host time of the decision [s].
-        velocity: the speeds.
-    """
+    """Speeds with the host time of their decision [s]: the driver process follows none that were held up anywhere."""
 
     decided: float
     velocity: SetJointVelocity
@@ -63,11 +49,7 @@ class DatedVelocity(NamedTuple):
 
 
 class EndReaction(NamedTuple):
-    """Command to end the motion that ``SetJointVelocity`` began.
-
-    Attributes:
-        deceleration: of the leading joint [rad/s2].
-    """
+    """Command to end what ``SetJointVelocity`` began, with a deceleration of the leading joint [rad/s2]."""
 
     deceleration: float
 

@@ -112,9 +112,6 @@ class StopConnections(_Connection, Protocol):
 
     Entering it in a ``with`` opens all of them and proves that stops are taken, or raises RobotConnectionError or
     RobotRefused; ``reopen`` opens what it can.
-
-    Attributes:
-        host: the controller.
     """
 
     host: str

@@ -23,7 +23,6 @@ class TcpReader:
     """Reader of payloads from one TCP port; open it in a ``with``.
 
     Args:
-        host: the controller.
         timeout: how long connecting and each reply may take [s].
 
     Raises:
@@ -107,7 +106,6 @@ class TcpStops:
     """Sockets that stops go through; open it in a ``with``.
 
     Args:
-        host: the controller.
         timeout: how long connecting may take [s].
 
     Raises:

@@ -98,11 +98,7 @@ class SetpointProgram(NamedTuple):
 
 
 class SetSpeedSlider(NamedTuple):
-    """Command to set the controller's speed slider.
-
-    Attributes:
-        fraction: from 0 to 1.
-    """
+    """Command to set the controller's speed slider, from 0 to 1."""
 
     fraction: float
 

@@ -51,7 +51,6 @@ class ArmSupervisor:
         model: the arm.
         driver: of the arm's controller.
         rules: what the arm does when it is touched.
-        limits: of the monitoring.
         paths: the stop paths that there are. The first is used for every stop, the others where it does not work.
             Without DRIVER, what moves the arm is not known here.
         planner: of motions away from a touch. None where no reaction moves the arm.

@@ -54,7 +54,6 @@ class CompanionMonitor:
     """Monitor of the processes beside one guard.
 
     Args:
-        limits: of the monitoring.
         arm: the arm under guard, or None: then there are none to miss.
     """
 
@@ -94,7 +93,6 @@ class CompanionMonitor:
         """Note that this computer does not let the driver process, or a guard watchdog, run at a host time [s].
 
         Args:
-            now: host time [s].
             load: how busy the computer is, in words.
             name: of the process, one of ``HELPER_NAMES``.
 
@@ -142,7 +140,6 @@ class CompanionMonitor:
         Args:
             now: host time [s].
             measured_at: host time at which it was measured [s].
-            running: a program runs.
         """
         ran, end, restarted_at = self._program
         if measured_at < restarted_at:

@@ -75,7 +75,6 @@ class GuardCore:
     Args:
         stream: decodes and detects. It knows the sensors.
         sensors: where they are.
-        limits: of the monitoring.
         arm: the arm under guard, or None.
         not_commissioned: why the arm only stops where its scene lets it move away. Empty where it does not.
     """

@@ -169,8 +169,6 @@ class GuardLoop:
     """Loop of one core on its ports.
 
     Args:
-        core: decides.
-        ports: what it is connected to.
         clock: monotonic seconds.
         sleepless_clock: the same, which goes on while the computer sleeps.
     """

@@ -113,7 +113,6 @@ class Supervision:
     """All that is decided about an arm under guard.
 
     Attributes:
-        phase: where it is.
         stop: number of the newest stop, counted from 1. A motion away and its end belong to the stop before.
         why: cause of that stop, and what came of it.
         may_move: what stopped the arm lets it move away.
@@ -139,7 +138,6 @@ def transition(state: Supervision, cue: Cue, what: str = "", decide_by: float = 
     """Return what a supervision becomes, and what follows. The same one where the cue changes nothing.
 
     Args:
-        state: as it is.
         cue: what has happened.
         what: cause of a stop, or what came of it, in words.
         decide_by: of ``WAITS`` [s].

@@ -51,7 +51,6 @@ class BareSides:
     """Sides of one arm that its skins leave bare.
 
     Args:
-        model: the arm.
         sheets: each skin: index of its link's DH frame, and its side in that frame.
 
     Attributes:

@@ -57,7 +57,6 @@ class ContactSupervision:
     """Supervision of one motion by the touches that it leaves.
 
     Args:
-        model: the arm.
         q: joint positions at its start [rad].
         contacts: touches at its start.
         complying: True for a compliant motion.
@@ -168,7 +167,6 @@ class ContactApproach:
     """Approach of one arm to the touches that it goes on under.
 
     Args:
-        model: the arm.
         q: joint positions at the touch, or just before [rad].
         qd: joint speeds then [rad/s].
         deceleration: of the leading joint in a stop [rad/s2].

@@ -52,9 +52,7 @@ class _AdmittanceMotion:
     its limits are the same. It ends with the touch, or when the distance or the time is used up.
 
     Args:
-        model: the arm.
         state: of the arm, standing.
-        reaction: the settings.
         space: the room that the arm has, or None.
 
     Attributes:
@@ -76,7 +74,6 @@ class _AdmittanceMotion:
         """Return what to do in this control cycle, as firm as the current push.
 
         Args:
-            state: the arm as measured.
             contacts: the touches there are. Without one it is over.
         """
         reaction = self._reaction
@@ -176,12 +173,10 @@ def plan_reaction_motion(
     """Return the motion that a reaction wants, or why there is none.
 
     Args:
-        model: the arm.
         reaction: its kind is "retreat" or "comply".
         at_touch: the arm when the touch was seen.
         state: the arm now, standing.
         contacts: the touches, as they were last seen.
-        space: the room that the arm has.
     """
     for contact in contacts:
         if not contact.location_valid:  # nobody knows yet what is in front of it, or behind

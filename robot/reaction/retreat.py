@@ -50,9 +50,7 @@ class RetreatPlan:
     """Plan of a retreat, made once, at the touch, for ``retreat_step``.
 
     Attributes:
-        model: the arm.
         tracks: one for each touched point.
-        reaction: the settings.
         reach: of the arm, from each joint's axis [m].
         start_time: of the touch [s].
         space: the room that the arm has, or None.
@@ -85,10 +83,8 @@ def plan_retreat(
     """Fix direction, point and start of a retreat.
 
     Args:
-        model: the arm.
         state: the arm at the touch.
         contacts: all touches at that time.
-        reaction: the settings.
         space: the room that the arm has; without it nothing is in the way.
         sweep: where the whole arm was when the motion began; without it its way is not bounded.
 
@@ -120,12 +116,7 @@ def plan_retreat(
 
 
 def retreat_step(plan: RetreatPlan, state: ArmState) -> JointVelocity | Done:
-    """Return the command of this control cycle; the same for the same arguments.
-
-    Args:
-        plan: of this retreat.
-        state: the arm as measured.
-    """
+    """Return the command of this control cycle; the same for the same arguments."""
     reaction = plan.reaction
     q, qd = state.q, state.qd or (0.0,) * len(state.q)
     if not math.isfinite(sum(q)):

@@ -162,7 +162,6 @@ class Done:
     """End of a motion, or its impossibility: brake and stand.
 
     Attributes:
-        reason: why.
         progress: how far the touched point got [m].
         complete: it got as far as it was to.
     """

@@ -49,7 +49,6 @@ class _FaultInjector:
     network leaves the arm alive: no packet goes through in either direction, nothing is closed, nothing can be opened.
 
     Args:
-        controller: whose faults they are.
         network: first word of a line ("close", "cut", "restore") -> what does that to a service.
 
     Attributes:
@@ -145,7 +144,6 @@ class Server:
     """Server on the ports of a UR controller, which also runs its control cycle.
 
     Args:
-        controller: what it serves.
         host: address to listen on.
         faults: whether to open a port on which `FaultInjector` takes lines. It is open to this computer alone.
 

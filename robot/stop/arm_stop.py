@@ -24,7 +24,6 @@ class ArmStop:
     The first path is used for every stop, the others where it does not work.
 
     Args:
-        limits: of the monitoring.
         paths: the stop paths that there are, in the order of their use.
         held_braking: returns the deceleration that the motors hold at joint positions and speeds [rad/s2]. None where
             what the arm weighs is not known: then it is taken to brake as commanded.

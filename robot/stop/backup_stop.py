@@ -44,13 +44,10 @@ class StandstillHold:
     """Hold of one arm at standstill. A person who pushes or jogs the arm is left alone: no program runs then.
 
     Args:
-        driver: of the arm.
         connections: open, or to be opened as far as that is possible.
-        limits: of the monitoring.
         deceleration: of its stops, where the guard asks for no other [rad/s2].
         reader: of the controller's state, open; None where there is none yet.
         held_braking: as of `ArmStop`.
-        clock: monotonic seconds.
 
     Attributes:
         reader: connection that tells of new states; None while there is none.

@@ -37,11 +37,8 @@ class _GuardWatchdog:
     """Watchdog over one guard.
 
     Args:
-        guard: the guard's channel.
         session: the guarded program's channel; it ends, or says ``LEAVE``, when the program leaves.
-        hold: of the arm.
         second: True for the one that waits longer.
-        clock: monotonic seconds.
     """
 
     def __init__(

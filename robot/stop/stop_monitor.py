@@ -54,7 +54,6 @@ class StopMonitor:
         now: when the stop was commanded [s].
         speed: largest joint speed then [rad/s]; None where it is not known.
         paths: those that there are, the first of which has been used.
-        limits: of the monitoring.
         budget: time after which the arm should stand; beyond it a slowdown is no reason to wait, and the protective
             stop is next [s].
 

@@ -57,7 +57,6 @@ def carry_out(
     """Start what a program asks for, or answer it.
 
     Args:
-        arm: that it moves.
         request: with the name of what is to be done, and its values.
         work: called with a time [s] before a call that may block for so long, and with 0 after it.
         restart: called with False before the program on the controller is started anew, and with True after it.
@@ -142,9 +141,6 @@ class DriverProcess:
 
     Args:
         arm: the arm, already open.
-        guard: the guard's channel.
-        program: the program's channel.
-        clock: monotonic seconds.
         on_end: called before the last stop.
         work: called in each step, and with a time [s] before a call that may block for so long.
         request_lifetime: time after which a request that was not taken is void [s].

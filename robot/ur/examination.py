@@ -45,7 +45,6 @@ def examine(arm: ArmModel, host: str, scope: ExaminationScope) -> list[Finding]:
 
     Args:
         arm: that the scene names.
-        host: of the controller.
         scope: what the scene needs of it.
     """
     try:

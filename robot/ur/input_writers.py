@@ -93,7 +93,6 @@ class _InputOwner(RtdeConnection):
     """Connection that owns inputs of the controller and reads outputs that go with them; open it in a ``with``.
 
     Args:
-        host: the controller.
         timeout: how long connecting and each reply may take [s].
 
     Raises:
@@ -176,7 +175,6 @@ def set_slider(host: str, fraction: float, timeout: float) -> bool:
     """Set the slider to a fraction over a new connection that is closed again; the controller keeps the value.
 
     Args:
-        host: the controller.
         fraction: from 0 to 1.
         timeout: how long connecting and each reply may take [s].
 

@@ -79,7 +79,6 @@ def compare(
     """Return what a guard's limits must be with a controller as it was measured.
 
     Args:
-        measured: the controller.
         escalate: time after which a guard goes on to the next stop path [s].
         stop_budget: returns the time that it gives a stop [s], of a speed [rad/s] and a deceleration [rad/s2].
         watchdog_hz: of the scene's arm.

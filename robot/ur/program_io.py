@@ -36,7 +36,6 @@ class RtdeVariableReader:
     """Reader of the newest value of any variable; open it in a ``with``. Any thread may ask.
 
     Args:
-        host: the controller.
         timeout: how long connecting, each reply and a fresh value may take [s].
 
     Raises:
@@ -169,7 +168,6 @@ class RtdeOutputWriter:
     """Writer of outputs; open it in a ``with``. Any thread may write.
 
     Args:
-        host: the controller.
         timeout: how long connecting and each reply may take [s].
 
     Raises:
@@ -203,7 +201,6 @@ class RtdeOutputWriter:
         Args:
             group: "standard", "configurable" or "tool".
             number: from 0.
-            on: True for high.
 
         Raises:
             ValueError: there is no such output.

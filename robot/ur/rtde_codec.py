@@ -328,7 +328,6 @@ def decode_state(time: float, payload: bytes) -> ControllerState:
 
     Args:
         time: host time [s].
-        payload: recipe id and values.
 
     Raises:
         RobotConnectionError: the payload has another length, or its time, a position, a speed or a current is not

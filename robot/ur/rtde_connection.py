@@ -85,10 +85,7 @@ class RtdeConnection(TcpReader):
         return waiting + super().read()
 
     def wait_data(self, timeout: float) -> bytes:
-        """Wait for a data packet and return the payload of the newest one.
-
-        Args:
-            timeout: how long to wait [s].
+        """Wait for a data packet, for a time at most [s], and return the payload of the newest one.
 
         Raises:
             RobotTimeout: none came.
@@ -159,7 +156,6 @@ class StateReader(RtdeConnection):
     """Reader of the controller's state; open it in a ``with``.
 
     Args:
-        host: the controller.
         timeout: how long connecting and each reply may take [s].
 
     Raises:

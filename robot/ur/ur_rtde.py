@@ -111,7 +111,6 @@ class UrArm:
     """Arm behind RTDEControlInterface, which has a program of its own on the controller; open it in a ``with``.
 
     Args:
-        host: the controller.
         watchdog_hz: the controller stops the program when this process is silent for longer than 1 / watchdog_hz.
 
     Attributes:
@@ -204,7 +203,6 @@ class UrArm:
         Args:
             kind: "move_j" to positions and "move_j_ik" to a pose, in joint space; "move_l" to a pose and "move_l_fk" to
                 positions, straight.
-            target: where to.
             speed: of the leading joint [rad/s], or of the tool [m/s] where it moves straight.
             acceleration: likewise [rad/s2] or [m/s2].
 
@@ -242,7 +240,6 @@ class UrArm:
         Args:
             kind: "set_tcp": pose of the tool in the flange's frame (x, y, z [m], rotation vector [rad]); or
                 "set_payload": mass [kg], and its centre in the flange's frame [m].
-            values: that.
 
         Raises:
             RobotRefused: the arm is being moved, or the controller did not take it.
@@ -259,7 +256,6 @@ class UrArm:
 
         Args:
             kind: "speed_j" for speeds of the joints [rad/s], "speed_l" for a velocity of the tool [m/s, rad/s].
-            target: the speeds.
             acceleration: of the leading joint [rad/s2], or of the tool [m/s2].
 
         Raises:
@@ -301,7 +297,6 @@ class UrArm:
 
         Args:
             name: of the wheel's method, one of ``QUESTION_WORDS``.
-            values: its arguments.
 
         Raises:
             RobotRefused: the arm is being moved, or this is no such question.

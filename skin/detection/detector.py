@@ -76,7 +76,6 @@ class _ReportedTouch:
     """The touches of one sensor as its events tell them.
 
     Args:
-        sensor: the sensor.
         settings: by how much a touch has to change.
     """
 
@@ -88,20 +87,12 @@ class _ReportedTouch:
         self._told = 0.0, 0.0, 0.0, "", False, False
 
     def begin(self, touch: TouchReading) -> TouchBegan:
-        """Return the event with which a touch begins.
-
-        Args:
-            touch: the frame that confirms it.
-        """
+        """Return the event with which a touch begins, of the frame that confirms it."""
         self._told = touch.level, touch.u, touch.phi, touch.doubt, not touch.doubt, False
         return tuple.__new__(TouchBegan, (self._sensor.name, *touch))  # quicker than TouchBegan()
 
     def move(self, touch: TouchReading) -> TouchMoved | None:
-        """Return the event that a frame of a touch makes due. None where it tells nothing new.
-
-        Args:
-            touch: the frame, above the release threshold.
-        """
+        """Return the event that a frame above the release threshold makes due. None where it tells nothing new."""
         level_told, u_told, phi_told, doubted, placed, extended = self._told
         valid, step = touch.location_valid, touch.level - level_told
         shape = None if valid else touch.elongation
@@ -138,12 +129,7 @@ class _ReportedTouch:
 class Detector:
     """Touch detection on one sensor.
 
-    Args:
-        sensor: the sensor.
-        settings: how to decide.
-
     Attributes:
-        sensor: the sensor.
         ready: a run of valid untouched frames was seen, and no fault since: silence now means "no touch".
         reading_now: the newest valid frame while the sensor is touched, else None.
         timing: sequence and clocks, and counts of what was missing.
@@ -193,7 +179,6 @@ class Detector:
         """Take the next frame of this sensor.
 
         Args:
-            frame: the frame.
             now: host clock when it arrived [s], monotonic.
             alarm: called where a touch begins with this frame, and that is the first that happens in it.
 
@@ -305,9 +290,7 @@ class Detector:
         """Report a fault of what this sensor's frames come through: it has to become ready anew.
 
         Args:
-            fault: what is wrong.
             now: host clock [s].
-            detail: numbers that belong to it.
         """
         events: list[SkinEvent] = []
         self._report(events, fault, self.timing, now, detail)

@@ -66,9 +66,7 @@ class _WiringHypothesis:
     """One thing that is broken, or nothing.
 
     Args:
-        sensor: the sensor.
         words: what is broken, for people.
-        fault: its name.
         opened: electrodes whose wire is open.
         joined: two electrodes, or one and "ground", "supply" (before the current is measured) or "rail" (behind that).
         dead: electrodes, or "touch", whose readings are 0.
@@ -96,7 +94,6 @@ class _WiringHypothesis:
         """Return the readings over the supply, in the order of an observation.
 
         Args:
-            contact: the contact.
             upper: conductance of the upper sheet [S].
             lower: that of the lower one [S].
             highest: what a reading cannot exceed.
@@ -214,7 +211,6 @@ def _observe(sensor: Sensor, frame: Frame, noise: float, learned: bool) -> _Obse
     """Return a frame as an observation.
 
     Args:
-        sensor: the sensor.
         frame: whose supply is right.
         noise: standard deviation of a count.
         learned: the sheets are known from untouched frames.
@@ -280,7 +276,6 @@ class FaultDiagnosis:
     """The diagnosis of one sensor.
 
     Args:
-        sensor: the sensor.
         currents: of the untouched sensor.
 
     Attributes:

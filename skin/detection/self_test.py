@@ -31,7 +31,6 @@ class FrameSelfTest:
     """The self-test of the frames of one sensor.
 
     Args:
-        sensor: the sensor.
         currents: of the untouched sensor, with the noise that was learned.
     """
 

@@ -51,12 +51,7 @@ class FrameNumbers:
 
 
 def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNumbers:
-    """Measure how frames of one sensor follow each other.
-
-    Args:
-        frames: of one sensor, in their order.
-        times: when each came, host clock [s].
-    """
+    """Measure how frames of one sensor, in their order, follow each other; each came at a time of the host [s]."""
     steps, ticks = _sequence_steps(frames), _clock_steps(frames)
     seconds = times[-1] - times[0] if times else 0.0
     rate = (len(frames) - 1) / seconds if seconds > 0.0 else math.nan

@@ -191,8 +191,6 @@ class Circles:
     """The circles of n scenes of k discs in the rectangle; lengths in units of (shorter side)/pi.
 
     Attributes:
-        sheet: the sheet.
-        discs: the discs.
         order: M.
         offset: x + i y of the points from their centres, shape (n, k, N).
         slope: |d offset / d zeta| there, zeta on the unit circle, shape (n, k, N).

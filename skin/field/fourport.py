@@ -170,7 +170,6 @@ class Readings:
     """The answer of one phase; axes over electrodes run A, B, C, D.
 
     Attributes:
-        phase: what was solved.
         electrodes: potentials of the electrodes [V], shape (n, 4).
         terminals: potentials of the terminals, behind the leads, where an ADC reads [V], shape (n, 4).
         currents: from the terminals into the sensor [A], shape (n, 4).
@@ -191,10 +190,8 @@ def solve_phase(coupling: Coupling, upper: float, lower: float, phase: DrivePhas
     """Compute the potentials and currents of one phase.
 
     Args:
-        coupling: of the sheets.
         upper: conductance of the upper sheet without contacts, between its electrodes [S].
         lower: of the lower one [S].
-        phase: what is applied.
 
     Raises:
         FieldError: a sheet is connected to nothing: no contact and both its electrodes open.

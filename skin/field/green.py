@@ -89,7 +89,6 @@ def direct_features(
     """Prepare points at centre (s, p) + offset, shapes (n,) and (n, N).
 
     Args:
-        strip: the rectangle.
         offset: from the centre, mirrored.
         s: distance of the centre from the near end.
         p: distance of the centre from the near edge.
@@ -141,7 +140,6 @@ def kernel(
     """Compute Ra G_a + Rb G_b between every pair of points, without its linear part, shape (n, N, N').
 
     Args:
-        strip: the rectangle.
         first: field points, shape (n, N).
         second: source points, shape (n, N').
         resistance_a: of the sheet with electrodes across the shorter side.

@@ -31,7 +31,6 @@ class FieldMap:
     """The solved field of one scene in one phase.
 
     Attributes:
-        model: the sensor.
         discs: the contacts; may be none, if the phase fixes both sheets without them.
         electrodes: potentials of A, B, C, D [V].
         moments: of the current of each disc [A], shape (k, 2M+1).
@@ -210,7 +209,6 @@ def decode_errors(
     """Return decoded minus true (u [m], phi [rad]) by the paper's equations 20 and 24 from each guide pair's mean.
 
     Args:
-        model: the sensor.
         u: slant distance of the centres from end 1 [m].
         phi: azimuth of the centres [rad].
         radius: of the discs [m].

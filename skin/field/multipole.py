@@ -41,8 +41,6 @@ def resolution(
     depends on the contact too, and is left to the solution's own estimate.
 
     Args:
-        sheet: the sheet.
-        discs: the scenes.
         contrast: |Ru - Rl| / (Ru + Rl), the strength of the images in edges.
         tolerance: of the supply, above 0.
         order: M, if it is given.

@@ -80,7 +80,6 @@ def draw_potential(
         path: of the PNG.
         field: what to draw; a sector, not a cylinder.
         upper: the upper sheet; otherwise the lower one.
-        title: of the picture.
         names: electrode letter -> text, for the electrodes of this sheet.
         filled: colour the potential; otherwise only lines, as the paper's figures 4 and 6.
 
@@ -153,11 +152,9 @@ def paint_error(
     """Paint an error map on the flat sheet; blank where it is NaN.
 
     Args:
-        sheet: the sheet.
         u: slant distances of the grid [m], increasing, shape (n,).
         phi: azimuths of the grid [rad], increasing, shape (m,).
         error: values, shape (n, m).
-        label: of the scale.
         reach: value that the scale reaches at least, in the unit of the error.
 
     Returns:

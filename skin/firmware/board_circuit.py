@@ -174,7 +174,6 @@ def board_circuit(name: str, sensor: Sensor, converter: str = BUILT_IN) -> Board
     """Work out the circuit of a board for a sensor.
 
     Args:
-        name: of the board.
         sensor: as its design or its scene has it.
         converter: that stands in for the board's own, such as "ads1115".
 

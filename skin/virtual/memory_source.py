@@ -17,7 +17,6 @@ class MemorySource(Source):
     By default time is simulated and a day passes as fast as it can be computed.
 
     Args:
-        skin: the virtual skin.
         real_time: the bytes come when they are due.
 
     Attributes:

@@ -47,7 +47,6 @@ def play(
     The deadlines are absolute: being late once makes nothing later.
 
     Args:
-        skin: what to play.
         write: takes the bytes; False if they were lost.
         wait: lets so many seconds pass; True if the playing shall stop.
         pacing: is filled in while playing.
@@ -74,7 +73,6 @@ class PseudoTerminal(Openable):
     A guard loop that is to be timed should not share its process with this thread: use ``coneskin sim-skin`` there.
 
     Args:
-        skin: what to play.
         hold: begin the script at ``begin``, not at ``open``, so that a reader loses none of it.
 
     Attributes:

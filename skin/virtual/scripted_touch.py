@@ -186,7 +186,6 @@ def across_seam(cone: Frustum, u: float, phi: float, reach: float) -> tuple[floa
     """Return the part of a round contact that lies beyond the gap.
 
     Args:
-        cone: the active area.
         u: slant distance of its middle from end 1 [m].
         phi: azimuth of its middle [rad].
         reach: its radius [m].

@@ -330,8 +330,6 @@ class PressedSkin(VirtualSkin):
     """Virtual skin of bodies; foam and layers yield as those of any virtual skin.
 
     Args:
-        sensors: of the device.
-        touches: the script.
         coarse: let contacts move in steps of 0.2 mm and 1 mrad, where bytes are wanted in real time.
         options: of `VirtualSkin`, by name.
     """

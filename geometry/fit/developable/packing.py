@@ -77,9 +77,7 @@ def with_developables(
     """Find general cylinders and cones where they cover more of a link than the cones that were found on it.
 
     Args:
-        link: the link.
         cones: what ``fit_cones`` found on it with the same options.
-        options: of the search.
         say: called with the name of each step.
 
     Returns:

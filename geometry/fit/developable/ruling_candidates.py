@@ -155,7 +155,6 @@ def find_ruling_candidates(samples: SurfaceSamples, axes: list[AxisCandidate]) -
     """Find lines about which a link may have rulings; the same samples give the same lines.
 
     Args:
-        samples: points and normals of the hull.
         axes: known candidates for axes of cones, whose directions are tried too.
     """
     rng = np.random.default_rng(5)

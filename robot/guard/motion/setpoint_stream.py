@@ -83,7 +83,6 @@ class ReactionPlanner:
     """Planner that begins the motion that a reaction wants.
 
     Args:
-        model: the arm.
         watchdog_hz: of the setpoint program in the controller. None where the driver process moves the arm.
         table: height in the base frame that the arm must not go below while it moves [m].
         bare: sides of the arm that no skin covers. None where there are none.
@@ -119,7 +118,6 @@ class ReactionPlanner:
             at_touch: the arm when the touch was seen.
             here: the arm now, standing.
             contacts: the touches, as they were last seen.
-            out: takes commands and events.
         """
         if self.torque.now is None:
             return "the controller sends no motor currents: nothing shows what the arm presses on"
@@ -172,14 +170,11 @@ class MotionStream:
 
     Args:
         motion: what to do.
-        model: the arm.
-        reaction: its settings.
         torque: from outside on the joints.
         bare: sides that no skin covers, or None.
         here: the arm as it begins.
         contacts: the touches then.
         program: that follows the setpoints. None where the driver process does.
-        out: takes commands and events.
 
     Attributes:
         how: as of the motion.

@@ -22,7 +22,6 @@ class GuardedSensor:
     """Sensor on a link.
 
     Attributes:
-        name: the sensor's.
         link_name: of the link, for people.
         link: index of the link's DH frame.
         place: (u [m], phi [rad]) -> point [m] and outward unit normal, in the link's DH frame.
@@ -46,7 +45,6 @@ class Contact:
 
     Attributes:
         touch: as the skin reports it, in an event or in a frame.
-        where: the sensor.
         number: of the touch, from 1 on. One that begins anew has a new number.
     """
 
@@ -127,9 +125,6 @@ def _unit(start: Vector, end: Vector) -> Vector:
 
 class TouchRecord:
     """Record of the touches since one came to an arm that nothing touched.
-
-    Args:
-        rules: reactions of the scene.
 
     Attributes:
         contacts: touches that there are now, by every frame.

@@ -31,9 +31,6 @@ _FIT_ROUNDS: Final = 3  # over the touches; they are few, and seldom alike
 class OutsideTorque:
     """Torque from outside on the joints of one arm.
 
-    Args:
-        model: the arm.
-
     Attributes:
         now: by the newest state [N m]. None where the controller sends no currents, or it is not known what they say.
         spread: largest of each joint lately, while nothing touched [N m].
@@ -75,8 +72,6 @@ class ResistanceMonitor:
     """Monitor of one motion of ours: does something resist it, on the skin or beside it?
 
     Args:
-        model: the arm.
-        torque: from outside.
         yields: True where the motion gives way to a push, which may grow. Else no push may be more than at its start.
         tolerance: torque of each joint that counts as nothing [N m]. None for what was learned.
     """

@@ -140,7 +140,6 @@ def stopping_contact(stop: GuardEvent, events: Sequence[GuardEvent]) -> GuardEve
 
     Args:
         stop: an event "stopping".
-        events: of the run.
 
     Returns:
         an event "contact_located" or "contact". None where the stop was made for something else.
@@ -248,7 +247,6 @@ def encode_command(output: Command, process: str, taken: bool = True) -> bytes:
     """Return the payload of the block that records a command.
 
     Args:
-        output: of a guard's core.
         process: that takes what goes over no connection of the guard's own: "driver" or "watchdog".
         taken: it was sent.
     """
@@ -336,10 +334,7 @@ class EventFolding:
         """Put an event out, of a host time [s], or hold it back and count it.
 
         Args:
-            out: takes it.
-            name: of the event.
             about: what it is about: with the name, the kind.
-            now: host time [s].
             **details: of the event. The newest are reported.
         """
         kind = self._kinds.get((name, about))

@@ -123,7 +123,6 @@ class SpeedLimit:
     """Limit of one arm.
 
     Args:
-        model: the arm.
         speeds: that are permissible.
 
     Attributes:
@@ -149,7 +148,6 @@ class SpeedLimit:
         """Take a measured state. Return why the arm must be stopped, empty where it must not.
 
         Args:
-            state: of the arm.
             slider: where the controller's speed slider is. None where that is not known.
             out: takes the slider's setting, and an event.
         """

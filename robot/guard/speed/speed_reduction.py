@@ -94,7 +94,6 @@ class SpeedReduction:
     """Reaction "slow" of one arm: it lowers the speed slider, monitors the effect and puts it back.
 
     Args:
-        model: the arm.
         used: True where a reaction of the scene slows the arm.
         silence: longest time for which the controller may be silent [s].
 
@@ -145,9 +144,6 @@ class SpeedReduction:
             time: host time [s].
             state: of the arm, the newest.
             reaction: its kind is "slow".
-            limits: of the monitoring.
-            contacts: the touches there are.
-            out: takes commands and events.
         """
         before, top = self.known(time), [0.0, 0.0]
         if before is None or state is None:

@@ -30,7 +30,6 @@ class ScriptSocket:
 
     Args:
         address: numeric address.
-        port: of the server.
 
     Attributes:
         unread: bytes that have come.
@@ -137,7 +136,6 @@ class ScriptHost:
     """Controller of one arm below its programs: arm, inputs and outputs, clock and log. `Controller` is the whole.
 
     Args:
-        options: its kind.
         log: file for a JSON line for each event.
 
     Attributes:

@@ -262,7 +262,6 @@ class RemoteHandle:
     """Handle of a server of procedures.
 
     Args:
-        url: of the server.
         beyond: whether it may be another computer.
 
     Raises:

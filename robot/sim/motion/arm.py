@@ -70,11 +70,7 @@ _BRAKING_CYCLES = 4  # between two calculations of what the motors can do
 
 
 class MotionFault(Exception):
-    """Trajectory that cannot go on: the controller makes a protective stop of it.
-
-    Attributes:
-        cause: of that stop.
-    """
+    """Trajectory that cannot go on: the controller makes a protective stop of it."""
 
     def __init__(self, cause: StopCause, detail: str) -> None:
         super().__init__(f"{cause}: {cause.title}: {detail}")
@@ -96,7 +92,6 @@ class Motion(Protocol):
         """Return joint positions [rad] and speeds [rad/s] after one cycle.
 
         Args:
-            arm: the arm as it is now.
             scale: speed slider, 0..1.
             hold: slow down to a standstill.
         """

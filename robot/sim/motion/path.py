@@ -238,7 +238,6 @@ class ToolArc(_ToolPath):
     """Arc of a circle of the tool centre point (movec); a straight line where the three positions are on one.
 
     Args:
-        arm: the arm as it is now.
         via: position on the arc.
         target: its end.
         acceleration: of the tool [m/s^2].

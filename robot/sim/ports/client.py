@@ -18,7 +18,6 @@ class Client:
     """Connection of one client.
 
     Args:
-        sock: the connection.
         receive: bytes of the client in, bytes for it out.
         closed: called once the connection is gone.
         outputs: data of a cycle that it is sent without asking; None where it is sent none.

@@ -84,7 +84,6 @@ class ExpressionParser:
     """Parser of expressions, in the order in which they stand in a program.
 
     Args:
-        text: of the program.
         functions: names of its own functions.
         builtins: names of the controller's functions -> whether they take time, and are therefore generators.
     """

@@ -45,11 +45,7 @@ class ContactMatrix(NamedTuple):
 
 
 class FrameInversion:
-    """The inversion of the frames of one sensor.
-
-    Args:
-        sensor: the sensor.
-    """
+    """The inversion of the frames of one sensor."""
 
     def __init__(self, sensor: Sensor) -> None:
         parts = sensor.electronics
@@ -162,11 +158,7 @@ class MatrixNoise(NamedTuple):
 
 
 class FrameNoise:
-    """The noise of the frames of one sensor.
-
-    Args:
-        sensor: the sensor.
-    """
+    """The noise of the frames of one sensor."""
 
     def __init__(self, sensor: Sensor) -> None:
         parts = sensor.electronics
@@ -181,7 +173,6 @@ class FrameNoise:
 
         Args:
             matrix: of the frame, or the mean of some like it.
-            frame: the frame.
             variance: of each count, its rounding included [counts^2].
         """
         x, y, along, cross, around = matrix.x, matrix.y, matrix.along, matrix.cross, matrix.around

@@ -89,8 +89,6 @@ def read(
     """Work out what a frame says.
 
     Args:
-        sensor: the sensor that sent the frame.
-        frame: the frame.
         inversion: of this sensor, where it is at hand.
         noise: standard deviation of a reading that was learned [counts]. Thresholds may be raised by it.
         judged: what ``judge`` says of the frame, where that is known.

@@ -50,7 +50,6 @@ class UntouchedCurrents:
     """The two drive currents of an untouched sensor.
 
     Args:
-        sensor: the sensor.
         drift: fastest change that is followed once they are known, as a ratio of the current [1/s].
 
     Attributes:
@@ -102,7 +101,6 @@ class UntouchedCurrents:
         """Take the currents of a quiet frame.
 
         Args:
-            frame: the frame.
             period: time from frame to frame [s].
 
         Returns:
@@ -211,9 +209,6 @@ class UntouchedZero:
     An untouched sensor draws no current in the touch phase, so every frame shows it. It is the median of some:
     where there is no bias, half of the noise is cut off at 0. It is taken off all three drive currents.
 
-    Args:
-        sensor: the sensor.
-
     Attributes:
         counts: what is taken off.
         known: it has been seen.
@@ -239,7 +234,6 @@ class UntouchedZero:
         """Take a frame, as it came, of a sensor that is not touched. Tell whether another zero was found at once.
 
         Args:
-            frame: the frame.
             period: time from frame to frame [s].
             free: nobody relies on the sensor yet: another zero may be taken at once.
         """

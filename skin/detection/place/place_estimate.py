@@ -206,9 +206,6 @@ class PlaceEstimate(NamedTuple):
 class PlaceEstimator:
     """The places of the contacts on one sensor.
 
-    Args:
-        sensor: the sensor.
-
     Attributes:
         curvature: of the arc at end 1, signed [1/m]: the sheet is stretched by exp(curvature x).
         length: of the rectangle between the arcs [m].

@@ -56,9 +56,7 @@ class SeamCertainty:
     """The presses over the seam of one sensor.
 
     Args:
-        sensor: the sensor.
         settings: how far a place may move while it is certain, and the weakest second contact that is to be excluded.
-        estimator: of its places.
         breadth: of the wrap at the wider end [m].
 
     Attributes:

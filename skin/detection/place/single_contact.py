@@ -52,7 +52,6 @@ class SingleContactTest:
     """The evidence of one touch, averaged over its frames.
 
     Args:
-        sensor: the sensor.
         settings: the weakest second contact, the largest single one.
         currents: of the untouched sensor.
     """
@@ -149,7 +148,6 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100) -> float:
     not either. Where this is above ``DetectorSettings.second_contact``, no place is certain after so many frames.
 
     Args:
-        sensor: the sensor.
         frames: of the touch that are averaged, up to 512, with the noise that is assumed before any is learned.
     """
     currents = UntouchedCurrents(sensor, 0.0)
@@ -163,7 +161,6 @@ def frames_until_certain(sensor: Sensor, settings: DetectorSettings) -> int | No
     """Return for how many frames a firm touch by one contact lasts before its place is certain. None where it never is.
 
     Args:
-        sensor: the sensor.
         settings: the weakest second contact that is to be excluded.
     """
     one = weakest_pair_excluded(sensor, 1)  # it falls with the square root of the number of frames

@@ -81,8 +81,6 @@ class TouchFilter:
         """Take the matrix of the next frame.
 
         Args:
-            matrix: of the frame.
-            noise: of one frame.
             period: time from frame to frame [s].
         """
         if not self.frames:

@@ -40,7 +40,6 @@ class TouchPlace:
     """The places of the touches of one sensor.
 
     Args:
-        sensor: the sensor.
         settings: how far a place may move while it is certain, and what a single contact is.
         currents: of the untouched sensor.
         leak: between its layers, which is no part of a touch.
@@ -103,7 +102,6 @@ class TouchPlace:
 
         Args:
             frame: a valid one.
-            reading: what it says.
             level: its level, the drift taken off.
             now: host clock [s].
         """
@@ -121,7 +119,6 @@ class TouchPlace:
 
         Args:
             frame: a valid one.
-            reading: what it says.
             level: its level, the drift taken off.
             now: host clock [s].
             period: time from frame to frame [s].

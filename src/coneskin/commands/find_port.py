@@ -72,13 +72,6 @@ def _await_port(
 ) -> PortFacts:
     """Watch the list of ports for a time [s] until one has come, and tell the person what to do.
 
-    Args:
-        look: returns the ports that are there.
-        say: takes what the person is told.
-        timeout: for a port to come [s].
-        clock: [s].
-        sleep: lets so many seconds pass.
-
     Raises:
         SkinTimeout: none has come.
     """

@@ -88,8 +88,6 @@ def misfit(sensor: Sensor, wrong: _Misreading, marks: Sequence[Place], read: Seq
     """Compare readings with what a misreading of the marks would give.
 
     Args:
-        sensor: that was touched.
-        wrong: the misreading.
         marks: where it was touched; at least one.
         read: what it read there, in the same order.
     """
@@ -127,7 +125,6 @@ def power(sensor: Sensor, marks: Sequence[tuple[Place, ...]]) -> float:
     this. Below 1 one of them could pass.
 
     Args:
-        sensor: that has the marks.
         marks: ``shifts`` of each mark; none at all show nothing.
     """
     if not marks:
@@ -144,7 +141,6 @@ def explain(sensor: Sensor, marks: Sequence[Place], read: Sequence[Place]) -> st
     """Return the likely cause of readings that are not where they should be, for people.
 
     Args:
-        sensor: that was touched.
         marks: where it was touched; at least one.
         read: what it read there, in the same order.
     """

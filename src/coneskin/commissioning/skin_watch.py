@@ -36,7 +36,6 @@ class SkinWatch:
     """Readings of a scene's sensors, judged as the guard judges them but for their age.
 
     Args:
-        scene: with the sensors.
         source: of their bytes, opened once the watch is there.
     """
 
@@ -111,7 +110,6 @@ def check_touchable(scene: Scene, simulated: bool) -> None:
     """Refuse a scene whose marks nobody can touch.
 
     Args:
-        scene: whose skin is to be touched.
         simulated: its virtual skin is touched by this program, not by a person.
 
     Raises:
@@ -133,7 +131,6 @@ def skin_source(scene: Scene, stack: ExitStack, played_as: Scene | None) -> tupl
     """Return the source of a scene's skin, not open yet: what it sends before it is read would be lost.
 
     Args:
-        scene: with a source.
         stack: that ends the process.
         played_as: scene whose virtual skin, without its script of touches, is to send the bytes, from a process that
             ends with the stack; None for a real skin.
@@ -211,7 +208,6 @@ class TouchSession:
         """Have all marks of a judge touched, until it is over or cannot be carried out.
 
         Args:
-            judge: of the touches.
             watch: of the sensors, ready.
             duration: of each touch of a virtual skin [s].
             check: called some 50 times a second; raises what ends it.

@@ -139,7 +139,6 @@ class Lifeline:
     Args:
         channel: to the parent.
         parent: descriptor of the parent's process; None where the system has none, and the channel alone counts.
-        end: ends this process.
     """
 
     def __init__(self, channel: Channel, parent: int | None, end: Callable[[], None] = lambda: os._exit(1)) -> None:

@@ -60,11 +60,7 @@ class SceneError(ConeSkinError, ValueError):
 
 
 class MissingExtra(ConeSkinError, ImportError):
-    """A package that this job needs is not installed.
-
-    Attributes:
-        package: the package that is missing.
-    """
+    """A package that this job needs is not installed."""
 
     def __init__(self, package: str, job: str, extra: str | None = None, remedy: str = "") -> None:
         self.package = package

@@ -60,7 +60,6 @@ def read_text(path: Path, limit: int, what: str, refusal: Callable[[str], ConeSk
 
     Args:
         path: of the file, in UTF-8.
-        limit: [bytes].
         what: is wanted, such as "a TOML text".
         refusal: makes the error of a text.
         hint: where the file cannot be read.

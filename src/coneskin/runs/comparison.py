@@ -160,7 +160,6 @@ class Comparison:
     """Result of a comparison.
 
     Attributes:
-        labels: of the two.
         differences: in the order of time; empty where nothing counts.
         paired: events that have a partner.
         new: events of the second only.

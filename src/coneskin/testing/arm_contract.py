@@ -39,9 +39,6 @@ class ArmOnTest:
     """An arm, or its twin, whose controller a driver talks to.
 
     Attributes:
-        driver: of the controller.
-        model: of the arm.
-        host: the controller.
         move: lets a joint move faster than 0.1 rad/s for seconds, as a program beside the guard does.
         pull: takes the controller off the network, as a power cut does.
     """

@@ -39,7 +39,6 @@ class OpenLine:
     """A source that is open.
 
     Attributes:
-        source: the source.
         pull: pulls the plug; None where the line ends by itself after its last byte.
     """
 

@@ -85,12 +85,7 @@ class ConnectionGate:
         self._page = page
 
     def serve_arguments(self, handler: Callable[[Any], Awaitable[None]], **given: Any) -> dict[str, Any]:
-        """Return the arguments of the server's ``serve`` with this gate in them.
-
-        Args:
-            handler: of a connection.
-            **given: the arguments without the gate.
-        """
+        """Return the arguments of the server's ``serve`` with this gate in them."""
         answer = given.get("process_request")
 
         def process_request(connection: Any, request: Any) -> Any:

@@ -54,7 +54,6 @@ class _SheetField:
     """Field of one sensor at fixed points.
 
     Args:
-        sensor: the sensor.
         u: slant distances of the points from end 1 [m].
         phi: azimuths of the points [rad], in the shape of ``u``.
 
@@ -176,13 +175,7 @@ class _FieldPatches(NamedTuple):
 
 
 def _potential_colours(volts: Floats, low: float, high: float) -> NDArray[np.uint8]:
-    """Return the colour of each potential, in bands from low to high.
-
-    Args:
-        volts: potentials [V], shape (n,).
-        low: that has the first colour [V].
-        high: that has the last one.
-    """
+    """Return the colours of potentials [V], shape (n,), in bands from a low one to a high one."""
     share = np.clip((volts - low) / max(high - low, 1e-12), 0.0, 1.0)
     band = np.minimum(np.floor(share * _COLOUR_BANDS), _COLOUR_BANDS - 1) / (_COLOUR_BANDS - 1)
     knots = np.linspace(0.0, 1.0, len(_LOW_TO_HIGH))
@@ -227,11 +220,7 @@ class FieldChoice:
         self._stages = stages
 
     def show(self, moments: list[Moment]) -> None:
-        """Draw what is chosen.
-
-        Args:
-            moments: of the stages.
-        """
+        """Draw what is chosen, at a moment of each stage."""
         what = str(self._choice.value)
         if what not in _PHASE_SHEETS:
             self._clear()

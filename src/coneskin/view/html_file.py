@@ -38,7 +38,6 @@ def write_html(path: Path, courses: Sequence[RunCourse]) -> float:
 
     Args:
         path: of the file; a page that is there is replaced, and nothing else.
-        courses: the runs.
 
     Returns:
         pictures a second that the file has.

@@ -155,7 +155,6 @@ class LivePage:
     """Page that shows a stage, and the run of a guard whenever there is one.
 
     Args:
-        server: of the page.
         stage: what is shown while there is no run.
         find: returns the run to follow, None while there is none but the one it is given.
     """

@@ -130,7 +130,6 @@ def stop_entries(events: Sequence[GuardEvent], zero: float) -> list[tuple[GuardE
     """Return one entry for each stop, and one for each other event; what is told again is counted.
 
     Args:
-        events: of a run.
         zero: host time that counts as 0 [s].
 
     Returns:
@@ -194,7 +193,6 @@ def timeline(courses: Sequence[RunCourse], since: float, until: float) -> str:
     """Return the timeline of runs.
 
     Args:
-        courses: the runs.
         since: where it begins, on the page's clock [s].
         until: where it ends.
     """
@@ -292,7 +290,6 @@ def trace_drawings(courses: Sequence[RunCourse], since: float, until: float, liv
     """Return drawings of traces; of several, the page's script shows the one that its viewer chooses.
 
     Args:
-        courses: the runs.
         since: from when on, on the page's clock [s].
         until: until when.
         live: touch levels alone, up to now.

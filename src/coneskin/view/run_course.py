@@ -219,7 +219,6 @@ class History:
     """What has happened in a run so far.
 
     Args:
-        scene: of the run.
         keep: time that is kept [s]; infinite for a recording that is over.
 
     Attributes:

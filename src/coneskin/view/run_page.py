@@ -57,11 +57,7 @@ class _Playback:
         self._then: float | None = None
 
     def play(self, now: float) -> None:
-        """Go on from here; from the beginning where the end is shown.
-
-        Args:
-            now: the clock [s].
-        """
+        """Go on from here at a time of the clock [s]; from the beginning where the end is shown."""
         if self.time >= self.until:
             self.time = self.since
         self.playing, self._then = True, now
@@ -77,11 +73,7 @@ class _Playback:
             self.time = min(max(time, self.since), self.until)
 
     def poll(self, now: float) -> float:
-        """Go on by what has passed since the last call, and return the time that is shown [s].
-
-        Args:
-            now: the clock [s].
-        """
+        """Go on by what has passed since the last call, by the clock [s], and return the time that is shown [s]."""
         if self.playing:
             if self._then is not None and now > self._then:
                 self.time += self.speed * (now - self._then)
@@ -97,7 +89,6 @@ class _Player:
 
     Args:
         client: viser's ``ClientHandle``.
-        courses: the runs.
     """
 
     def __init__(self, client: Any, courses: Sequence[RunCourse]) -> None:

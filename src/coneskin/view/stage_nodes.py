@@ -54,7 +54,6 @@ def look_at_stages(server: PageServer, reach: float, count: int = 1) -> None:
     """Draw the floor, set the lights, and set from where a new viewer looks.
 
     Args:
-        server: of the page.
         reach: how far anything can be from its base [m].
         count: stages side by side.
     """
@@ -73,7 +72,6 @@ class StageNodes:
 
     Args:
         scene: viser's ``SceneApi``, of a server or of one viewer.
-        stage: what is drawn.
         root: name of the node above them, such as "/run".
         offset: where the base stands on the floor [m].
     """
@@ -199,7 +197,6 @@ def _on_sheet(side: PlacedFrustum, point: Vector, rows: Floats) -> tuple[NDArray
     """Return a band that lies on a sheet about a point.
 
     Args:
-        side: of the sheet.
         point: in the same frame [m].
         rows: where the band's two edges are from there, along u and around [m], shape (2, n, 2).
     """

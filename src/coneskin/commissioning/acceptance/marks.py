@@ -37,7 +37,6 @@ def plan_marks(
     """Choose marks that show every misreading.
 
     Args:
-        sensor: that has them.
         offered: all places that can be described.
         taken: marks that were touched already; they come first in the result.
         refused: marks that a person cannot reach.
@@ -82,7 +81,6 @@ def offer_marks(sensor: Sensor, placed: SensorOnArm, q: Sequence[float] | None) 
     """Return all places of a sensor that can be described.
 
     Args:
-        sensor: the sensor.
         placed: where it is; without an arm the words name its electrodes.
         q: joint positions of the arm [rad]; None without an arm.
     """

@@ -26,9 +26,7 @@ def draw_marks(scene: Scene, procedure: Procedure, q: Sequence[float] | None, pa
 
     Args:
         scene: whose sensors are commissioned.
-        procedure: with the marks.
         q: joint positions of the arm [rad]; None without an arm.
-        path: of the file.
 
     Raises:
         MissingExtra: matplotlib is not installed.

@@ -33,7 +33,6 @@ def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
     Around, the words have parts and no lengths: the face that is touched is farther out than the layers that are read.
 
     Args:
-        sensor: that is calibrated.
         count: their number: 4, 9 or 16, as many along as around.
     """
     cone = sensor.frustum

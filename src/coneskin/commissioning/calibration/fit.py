@@ -139,7 +139,6 @@ class CalibrationFit:
     """Result of a calibration's fit.
 
     Attributes:
-        place_map: of the sensor.
         along: what was fitted along, in words.
         around: what was fitted around.
         used: of each touch, whether it was used; the others miss what most touches say.

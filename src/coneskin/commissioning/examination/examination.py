@@ -49,12 +49,10 @@ class Doctor:
     """Examination of one scene.
 
     Args:
-        scene: to be examined.
         tell: called with each finding as it is made.
         ask: called with what a person is asked to do.
         touches: False to leave the guided touches out.
         hold_up_time: for which the hold-ups of this computer are measured [s]; 0 to leave them out.
-        clock: monotonic [s].
 
     Attributes:
         findings: so far.
@@ -126,7 +124,6 @@ class Doctor:
         """Examine what an open source sends, untouched and touched.
 
         Args:
-            source: open.
             settings: of the scene's source.
             toucher: touches a virtual skin as a person is asked to; None for a real one.
 
@@ -250,7 +247,6 @@ def set_sensor_keys(text: str, number: int, keys: Mapping[str, str]) -> str:
     """Return the text of a scene in which a sensor has other keys.
 
     Args:
-        text: of the scene file.
         number: of the ``[[link.sensor]]``, from 0 in the order of the file.
         keys: name -> value, a word; what the sensor's ``file`` says is overruled by it.
 

@@ -45,11 +45,8 @@ def guided_touches(
     """Ask for touches near A, B, C and D of a sensor, and return what it read at each.
 
     Args:
-        source: open.
-        sensor: to be touched.
         tell: called with what the person is told, and with the mark to touch; None to let go.
         patience: for each touch, and for the sensor to come to rest [s].
-        clock: monotonic [s].
         keep: called with each frame of the sensor.
 
     Returns:

@@ -180,7 +180,6 @@ def draw_screen(report: LineReport, *, with_hex: bool, columns: int, color: bool
     """Draw a report for a terminal; the first line is the diagnosis.
 
     Args:
-        report: what to draw.
         with_hex: show the bytes of the newest frame of each sensor, or the newest bytes.
         columns: width of the terminal.
         color: changed numbers and the diagnosis may be highlighted.

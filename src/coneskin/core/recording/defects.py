@@ -146,7 +146,6 @@ def find_defects(
     Args:
         extents: of all of its files, in their order.
         damages: file, number of extents before it, and the damage; in their order.
-        run: number of the recording.
     """
     foreign = (extent for extent in extents if extent.run != run)
     defects = [_misplaced(DefectKind.FOREIGN, extent, extent.end - extent.offset) for extent in foreign]

@@ -63,9 +63,7 @@ class BodyRegion:
     """Part of a body that the arm may strike.
 
     Attributes:
-        name: of it.
         body: mass and stiffness.
-        limits: of the force on it.
         links: indices of the links that may strike it; empty for all.
     """
 

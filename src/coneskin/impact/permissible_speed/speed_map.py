@@ -60,7 +60,6 @@ def permissible_speed(
 
     Args:
         at_speed: makes the contacts at a speed [m/s], all of which must keep them.
-        limits: to be kept.
         least: speed from which to look on [m/s]; where it does not keep them, from the lowest on.
         top: highest speed to look at [m/s].
     """
@@ -100,7 +99,6 @@ def speed_within_spread(
     Args:
         at_speed: makes the contacts at a speed [m/s] with a padding, all of which must keep them.
         padding: as its table says.
-        limits: to be kept.
         least, top: as of `permissible_speed`.
     """
     low, high = 1.0 - padding.spread, 1.0 + padding.spread
@@ -175,9 +173,6 @@ def contact_at(
         speed: of the patch along its normal [m/s].
         lever: that speed over that of the leading joint [m/rad].
         mass: of the arm there [kg].
-        region: that is struck.
-        measured: how the arm stops.
-        padding: of the skin.
         extra: way of the patch: the arm brakes as much later as it overshoots further, and moves with the mean lever of
             its way.
     """
@@ -212,7 +207,6 @@ def map_speeds(
 
     Args:
         scene: with an arm, skins, and its [padding].
-        limits: to be kept.
         any_position: True to let the arm be anywhere, also where the scene has a [motion].
         note: is told what is being computed.
 

@@ -200,7 +200,6 @@ def integrate(
     """Return the course of a contact from the first touch on.
 
     Args:
-        model: of the contact.
         horizon: until when [s].
         keep: False to keep no stretches, only what is read off them.
         stop_above: peak force at which to look no further [N].

@@ -119,8 +119,6 @@ class CollisionRun:
 
     Attributes:
         plant: the arm among its bodies.
-        meter: of the collision.
-        events: of the guard.
         now: virtual host time [s].
 
     Raises:

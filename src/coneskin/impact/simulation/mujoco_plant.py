@@ -104,10 +104,8 @@ class MujocoPlant:
     """Plant of one arm and its surroundings.
 
     Args:
-        model: the arm.
         sheets: its skins.
         bodies: around it.
-        padding: of the skins.
         bare: parts of the arm without a skin, which are as hard as a strip that a sheet leaves bare.
         q: joint positions at the beginning [rad].
         qd: joint speeds then [rad/s].

@@ -108,8 +108,6 @@ def describe_scene(
     """Return the whole model as MJCF.
 
     Args:
-        model: the arm.
-        inertia: of the arm.
         q: joint positions at which its servos are tuned [rad].
         sheets: on its links; geoms ``sheet0`` and so on.
         bodies: around it; geoms ``body0.0`` and so on, of which the second number counts the parts.

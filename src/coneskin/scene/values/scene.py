@@ -190,7 +190,6 @@ class PlacedSensor:
     """Sensor and its place.
 
     Attributes:
-        sensor: the sensor.
         placed: its frustum in the frame of the link's mesh, or of its DH frame.
     """
 

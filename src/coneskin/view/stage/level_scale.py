@@ -51,7 +51,6 @@ def level_bars(
     """Return a bar for each sheet: what its colours mean, and the level at this moment.
 
     Args:
-        sheets: on the page.
         levels: by the names of the sheets.
         force: between the arm and what it meets, where physics knows it [N].
         title: above the bars: whose they are, of several runs.

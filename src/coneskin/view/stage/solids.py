@@ -68,7 +68,6 @@ def barrel(
     """Return a closed cylinder with chamfered rims.
 
     Args:
-        name: of the solid.
         link: index of the DH frame that it moves with.
         place: pose in that frame of the cylinder, whose axis is z.
         radius: of it [m].

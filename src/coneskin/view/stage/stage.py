@@ -121,11 +121,7 @@ _LINE_WIDTH = 0.006  # m; from 2 m off still more than a pixel
 
 
 def floor_lines(reach: float) -> tuple[Floats, Ints]:
-    """Return vertices [m] and faces, seen from above, of lines that go as far as twice the reach each way.
-
-    Args:
-        reach: how far an arm on the floor can be from its base [m].
-    """
+    """Return vertices [m] and faces, seen from above, of lines as far as twice an arm's reach [m] each way."""
     count = max(1, math.ceil(2.0 * reach / SPACING))
     at, end, half = SPACING * np.arange(-count, count + 1), SPACING * count, 0.5 * _LINE_WIDTH
     corners = [np.stack([at + side, np.full_like(at, far)], axis=1) for far in (-end, end) for side in (-half, half)]
@@ -183,9 +179,7 @@ def set_stage(scene: Scene, placed: Sequence[SensorOnArm], title: str, meshes: b
     """Return the stage for a scene.
 
     Args:
-        scene: with arm and sensors.
         placed: its sensors, as of ``place_on_arm``.
-        title: for people.
         meshes: open the mesh files that the scene names, instead of making the link's solids from the arm's tables.
 
     Raises:
