@@ -50,19 +50,12 @@ class RulingFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BentStrip:
-    """A strip and the frame at its first ruling.
+    """A strip and the frame at its first ruling."""
 
-    Attributes:
-        arc: length along end 1 [m].
-        g: geodesic curvature of end 1 [1/m], sin a / radius of a cone.
-        k: normal curvature there [1/m]; 0 of a plane.
-        first: frame at the first ruling.
-    """
-
-    arc: float
-    g: float
-    k: float
-    first: RulingFrame
+    arc: float  #: length along end 1 [m]
+    g: float  #: geodesic curvature of end 1 [1/m], sin a / radius of a cone
+    k: float  #: normal curvature there [1/m]; 0 of a plane
+    first: RulingFrame  #: frame at the first ruling
 
     def frame(self, along: float) -> RulingFrame:
         """Return the frame at a distance [m] from the first ruling."""

@@ -82,21 +82,13 @@ def terms_of(name: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of one link, in the frame of the link.
+    """Triangles of one link, in the frame of the link."""
 
-    Attributes:
-        vertices: corners [m], shape (n, 3), all distinct.
-        faces: indices of three corners, shape (m, 3), each with an area; their winding may be inconsistent.
-        source: its origin, for messages.
-        unit: the unit of the file, a key of ``UNITS`` or, for COLLADA, the name in its unit tag.
-        notes: guesses and changes made while reading, one sentence each.
-    """
-
-    vertices: Floats
-    faces: Ints
-    source: str = "mesh"
-    unit: str = "m"
-    notes: tuple[str, ...] = ()
+    vertices: Floats  #: corners [m], shape (n, 3), all distinct
+    faces: Ints  #: indices of three corners, shape (m, 3), each with an area; their winding may be inconsistent
+    source: str = "mesh"  #: its origin, for messages
+    unit: str = "m"  #: the unit of the file, a key of ``UNITS`` or, for COLLADA, the name in its unit tag
+    notes: tuple[str, ...] = ()  #: guesses and changes made while reading, one sentence each
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertices", frozen(self.vertices, (None, 3), "vertices"))

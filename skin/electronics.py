@@ -122,16 +122,12 @@ class Polarity:
     The paper's figure 3 text and its eq. 13 agree only if r1 is the arc of B; then B is positive (eq. 13) and C is
     (eq. 21). A sensor that is wired the other way round is described here, not re-soldered.
 
-    Attributes:
-        radial: "B" (end 1, the default) or "A" (end 2).
-        angular: "C" (the edge phi = wrap, the default) or "D" (the edge phi = 0).
-
     Raises:
         SensorError: another electrode is named.
     """
 
-    radial: Literal["A", "B"] = "B"
-    angular: Literal["C", "D"] = "C"
+    radial: Literal["A", "B"] = "B"  #: "B" (end 1, the default) or "A" (end 2)
+    angular: Literal["C", "D"] = "C"  #: "C" (the edge phi = wrap, the default) or "D" (the edge phi = 0)
 
     def __post_init__(self) -> None:
         if self.radial not in ("A", "B"):

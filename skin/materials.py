@@ -22,15 +22,10 @@ from coneskin.core.errors import SensorError
 
 
 class SheetMaterial(NamedTuple):
-    """A conductive sheet.
+    """A conductive sheet."""
 
-    Attributes:
-        name: what to ask a supplier for.
-        ohms: nominal resistance per square [ohm]; it varies by 10 to 30 % from lot to lot.
-    """
-
-    name: str
-    ohms: float
+    name: str  #: what to ask a supplier for
+    ohms: float  #: nominal resistance per square [ohm]; it varies by 10 to 30 % from lot to lot
 
     @property
     def label(self) -> str:

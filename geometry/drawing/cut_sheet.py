@@ -76,27 +76,18 @@ _WIDEST_FLAP = 0.25  # of the way around the narrow end; a wider flap covers the
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """A line for the cutter.
+    """A line for the cutter."""
 
-    Attributes:
-        kind: cut (an outer border), hole, score (a mark, not a cut) or fold.
-        outline: its course on the flat pattern.
-    """
-
-    kind: _StrokeKind
-    outline: Outline
+    kind: _StrokeKind  #: cut (an outer border), hole, score (a mark, not a cut) or fold
+    outline: Outline  #: its course on the flat pattern
 
 
 @dataclass(frozen=True, slots=True)
 class CutPart:
-    """One piece of material.
-
-    Attributes:
-        strokes: lines for the cutter, in order: marks, holes, then the border.
-    """
+    """One piece of material."""
 
     name: str
-    strokes: tuple[Stroke, ...]
+    strokes: tuple[Stroke, ...]  #: lines for the cutter, in order: marks, holes, then the border
     labels: tuple[PartLabel, ...]
 
     @property
@@ -113,21 +104,13 @@ class CutPart:
 
 @dataclass(frozen=True, slots=True)
 class CutSheet:
-    """The parts that are cut from one material.
+    """The parts that are cut from one material."""
 
-    Attributes:
-        number: position in the order of assembly, from the link outwards, from 1.
-        name: of the layer.
-        material: material and thickness.
-        face: face of the sensor that is up in the drawing.
-        surface: cone for which the parts are cut.
-    """
-
-    number: int
-    name: str
-    material: str
-    face: _SheetFace
-    surface: Frustum
+    number: int  #: position in the order of assembly, from the link outwards, from 1
+    name: str  #: of the layer
+    material: str  #: material and thickness
+    face: _SheetFace  #: face of the sensor that is up in the drawing
+    surface: Frustum  #: cone for which the parts are cut
     parts: tuple[CutPart, ...]
 
     @property

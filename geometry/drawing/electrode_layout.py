@@ -307,21 +307,13 @@ def _patch(a: ShapeCorner, b: ShapeCorner) -> SurfaceRectangle:
 
 @dataclass(frozen=True, slots=True)
 class ResolutionForecast:
-    """Change of the location for one count of the A/D converter, at one slant distance.
+    """Change of the location for one count of the A/D converter, at one slant distance."""
 
-    Attributes:
-        u: slant distance from end 1 of the active area [m].
-        along: change of the slant distance [m].
-        azimuth: change of the azimuth about the axis [rad].
-        around: the change of azimuth as a length on the sheet [m].
-        theta: the change of azimuth as a polar angle on the flat sheet [rad]; 0 on a cylinder.
-    """
-
-    u: float
-    along: float
-    azimuth: float
-    around: float
-    theta: float
+    u: float  #: slant distance from end 1 of the active area [m]
+    along: float  #: change of the slant distance [m]
+    azimuth: float  #: change of the azimuth about the axis [rad]
+    around: float  #: the change of azimuth as a length on the sheet [m]
+    theta: float  #: the change of azimuth as a polar angle on the flat sheet [rad]; 0 on a cylinder
 
 
 def forecast_resolution(active: Frustum, step: float, u: float) -> ResolutionForecast:

@@ -20,19 +20,12 @@ _MIN_BED_SIDE, _MAX_BED_SIDE = 0.05, 10.0  # m; side of a bed
 
 @dataclass(frozen=True, slots=True)
 class MaterialBed:
-    """One piece of material with the parts that are cut from it.
+    """One piece of material with the parts that are cut from it."""
 
-    Attributes:
-        material: its name.
-        number: of the piece among those of its material, from 1.
-        sheets: the parts at their places; the lower left corner of the bed is (0, 0).
-        used: width and depth of the corner of the bed that holds all parts [m].
-    """
-
-    material: str
-    number: int
-    sheets: tuple[CutSheet, ...]
-    used: tuple[float, float]
+    material: str  #: its name
+    number: int  #: of the piece among those of its material, from 1
+    sheets: tuple[CutSheet, ...]  #: the parts at their places; the lower left corner of the bed is (0, 0)
+    used: tuple[float, float]  #: width and depth of the corner of the bed that holds all parts [m]
 
     @property
     def slug(self) -> str:

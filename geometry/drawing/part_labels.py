@@ -28,21 +28,13 @@ _LINE_PITCH = 1.7  # from one line to the next, in heights of capitals
 
 @dataclass(frozen=True, slots=True)
 class PartLabel:
-    """A line of text, centred on a point.
+    """A line of text, centred on a point."""
 
-    Attributes:
-        text: plain ASCII.
-        x: of the centre [m].
-        y: of the centre [m].
-        height: of capitals [m].
-        angle: of the line [rad], counter-clockwise.
-    """
-
-    text: str
-    x: float
-    y: float
-    height: float
-    angle: float = 0.0
+    text: str  #: plain ASCII
+    x: float  #: of the centre [m]
+    y: float  #: of the centre [m]
+    height: float  #: of capitals [m]
+    angle: float = 0.0  #: of the line [rad], counter-clockwise
 
     @property
     def width(self) -> float:

@@ -33,19 +33,12 @@ class ShapeCorner:
 
 @dataclass(frozen=True, slots=True)
 class ShapeTab:
-    """A rectangle that extends outwards from a side.
+    """A rectangle that extends outwards from a side."""
 
-    Attributes:
-        u: slant distance of the middle of its foot [m].
-        phi: azimuth of the middle of its foot [rad].
-        width: along the side [m].
-        length: away from the sheet [m].
-    """
-
-    u: float
-    phi: float
-    width: float
-    length: float
+    u: float  #: slant distance of the middle of its foot [m]
+    phi: float  #: azimuth of the middle of its foot [rad]
+    width: float  #: along the side [m]
+    length: float  #: away from the sheet [m]
     side: SheetSide
 
 

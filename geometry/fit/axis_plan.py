@@ -120,13 +120,9 @@ _MIN_CELL_SHARE = 0.97  # of the largest side so far: fewer cells near a line ho
 
 @dataclass(frozen=True, slots=True)
 class SheetRequirements(FitOptions):
-    """Options of a search that are checked already, or made of such; its weights are those of the link.
+    """Options of a search that are checked already, or made of such; its weights are those of the link."""
 
-    Attributes:
-        least_gain: what a further sheet must add, by the weights [m2].
-    """
-
-    least_gain: float = 0.0
+    least_gain: float = 0.0  #: what a further sheet must add, by the weights [m2]
 
     def __post_init__(self) -> None:
         """Check nothing: a search looks beyond the limits too."""
@@ -144,15 +140,10 @@ class SheetRequirements(FitOptions):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisPlan:
-    """Straight sides about one axis that are to become sheets.
+    """Straight sides about one axis that are to become sheets."""
 
-    Attributes:
-        profile: the hull about the axis; cells on which no sheet may lie have the weight 0.
-        sides: the sides, in order along the axis; empty where none is within the tolerance.
-    """
-
-    profile: RadialProfile
-    sides: list[StraightSide]
+    profile: RadialProfile  #: the hull about the axis; cells on which no sheet may lie have the weight 0
+    sides: list[StraightSide]  #: the sides, in order along the axis; empty where none is within the tolerance
 
     @property
     def area(self) -> float:

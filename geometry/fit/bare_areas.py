@@ -58,17 +58,11 @@ _LEAST_SHARE = 0.01  # of the hull; a smaller bare area is not reported
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BareArea:
-    """A part of the hull without a sheet.
+    """A part of the hull without a sheet."""
 
-    Attributes:
-        reason: why no sheet lies there, in words.
-        share: of the hull.
-        points: samples of it [m], shape (n, 3).
-    """
-
-    reason: str
-    share: float
-    points: Floats = field(repr=False)
+    reason: str  #: why no sheet lies there, in words
+    share: float  #: of the hull
+    points: Floats = field(repr=False)  #: samples of it [m], shape (n, 3)
 
 
 class BareTally:

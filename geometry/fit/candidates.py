@@ -207,17 +207,11 @@ _DISTANCE_GATES = ((0.002, 0.0005), (0.001,), (0.005,))  # m, one after another;
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisCandidate:
-    """An axis about which sheets may lie.
+    """An axis about which sheets may lie."""
 
-    Attributes:
-        origin: a point of the axis [m], shape (3,).
-        axis: unit vector; its largest component is positive, shape (3,).
-        cones: the cones fitted about it; empty for an axis of revolution.
-    """
-
-    origin: Floats
-    axis: Floats
-    cones: tuple[InfiniteCone, ...]
+    origin: Floats  #: a point of the axis [m], shape (3,)
+    axis: Floats  #: unit vector; its largest component is positive, shape (3,)
+    cones: tuple[InfiniteCone, ...]  #: the cones fitted about it; empty for an axis of revolution
 
 
 def find_axis_candidates(samples: SurfaceSamples) -> list[AxisCandidate]:
@@ -274,21 +268,14 @@ _SEARCH_SAMPLES = 6000  # points on the mesh from which the axes are found, what
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledLink:
-    """A link with all that every search on it needs.
-
-    Attributes:
-        hull: samples by which sheets are looked for.
-        counted: samples by which coverage is measured.
-        weights: what areas count; None where all count the same.
-        axes: about which sheets may lie.
-    """
+    """A link with all that every search on it needs."""
 
     mesh: Mesh
     rays: RayCaster
-    hull: SurfaceSamples
-    counted: SurfaceSamples
-    weights: TouchWeights | None
-    axes: list[AxisCandidate]
+    hull: SurfaceSamples  #: samples by which sheets are looked for
+    counted: SurfaceSamples  #: samples by which coverage is measured
+    weights: TouchWeights | None  #: what areas count; None where all count the same
+    axes: list[AxisCandidate]  #: about which sheets may lie
 
     @property
     def hull_area(self) -> float:

@@ -22,19 +22,12 @@ _MAX_STEPS = 30  # Gauss-Newton steps at the last gate
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InfiniteCone:
-    """A cone without ends, or a cylinder.
+    """A cone without ends, or a cylinder."""
 
-    Attributes:
-        origin: a point of the axis [m], shape (3,).
-        axis: unit vector, shape (3,).
-        radius: distance of the side from the axis at the origin [m].
-        half_angle: angle between side and axis [rad]; positive where the cone widens along the axis.
-    """
-
-    origin: Floats
-    axis: Floats
-    radius: float
-    half_angle: float
+    origin: Floats  #: a point of the axis [m], shape (3,)
+    axis: Floats  #: unit vector, shape (3,)
+    radius: float  #: distance of the side from the axis at the origin [m]
+    half_angle: float  #: angle between side and axis [rad]; positive where the cone widens along the axis
 
     def cylindrical_coordinates(self, points: Floats) -> tuple[Floats, Floats]:
         """Return the distances from the axis and the heights along it from the origin [m], each of shape (n,)."""

@@ -19,15 +19,10 @@ from .touch_weights import TouchWeights
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisFrame:
-    """An axis with the direction of azimuth 0.
+    """An axis with the direction of azimuth 0."""
 
-    Attributes:
-        origin: a point of the axis [m], shape (3,).
-        columns: unit vectors of azimuth 0, of azimuth pi / 2 and of the axis as columns, shape (3, 3).
-    """
-
-    origin: Floats
-    columns: Floats
+    origin: Floats  #: a point of the axis [m], shape (3,)
+    columns: Floats  #: unit vectors of azimuth 0, of azimuth pi / 2 and of the axis as columns, shape (3, 3)
 
     @classmethod
     def along(cls, origin: Floats, axis: Floats, seam: Floats | None = None) -> AxisFrame:
@@ -83,22 +78,14 @@ class Region(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RadialProfile:
-    """Radius of the hull on a grid of heights and azimuths.
-
-    Attributes:
-        z: heights of the slices [m], ascending and evenly spaced, shape (k,).
-        phi: azimuths [rad], ascending from 0, evenly spaced over the turn, shape (p,).
-        radius: distance from the axis to the outermost surface [m], 0 where there is none, shape (k, p).
-        bridged: the same, with the holes and grooves filled that a sheet spans, shape (k, p).
-        weight: what an area counts there, 1 by default, shape (k, p); 0 where no sheet may lie.
-    """
+    """Radius of the hull on a grid of heights and azimuths."""
 
     frame: AxisFrame
-    z: Floats
-    phi: Floats
-    radius: Floats
-    bridged: Floats
-    weight: Floats | None = None
+    z: Floats  #: heights of the slices [m], ascending and evenly spaced, shape (k,)
+    phi: Floats  #: azimuths [rad], ascending from 0, evenly spaced over the turn, shape (p,)
+    radius: Floats  #: distance from the axis to the outermost surface [m], 0 where there is none, shape (k, p)
+    bridged: Floats  #: the same, with the holes and grooves filled that a sheet spans, shape (k, p)
+    weight: Floats | None = None  #: what an area counts there, 1 by default, shape (k, p); 0 where no sheet may lie
 
     @property
     def step(self) -> float:

@@ -218,25 +218,15 @@ def balance_borders(
 
 @dataclass(frozen=True, slots=True)
 class StraightSide:
-    """A straight side over some cells of a profile.
+    """A straight side over some cells of a profile."""
 
-    Attributes:
-        first: index of the first slice.
-        end: index after the last slice.
-        column: index of the first azimuth.
-        columns: number of azimuths; all of them for a full wrap.
-        radius: radius at z = 0 of the profile's frame [m].
-        slope: dr/dz.
-        rise: part of the radius that makes up for facets inside the true surface [m].
-    """
-
-    first: int
-    end: int
-    column: int
-    columns: int
-    radius: float
-    slope: float
-    rise: float = 0.0
+    first: int  #: index of the first slice
+    end: int  #: index after the last slice
+    column: int  #: index of the first azimuth
+    columns: int  #: number of azimuths; all of them for a full wrap
+    radius: float  #: radius at z = 0 of the profile's frame [m]
+    slope: float  #: dr/dz
+    rise: float = 0.0  #: part of the radius that makes up for facets inside the true surface [m]
 
     def radii(self, z: Floats) -> Floats:
         """Return the radii at heights z [m]."""

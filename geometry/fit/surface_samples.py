@@ -22,19 +22,12 @@ _FLAT_COSINE = math.cos(math.radians(2.0))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceSamples:
-    """Points on the hull of a link: the surface that is visible from outside.
+    """Points on the hull of a link: the surface that is visible from outside."""
 
-    Attributes:
-        points: on the mesh [m], shape (n, 3).
-        normals: unit outward normals of the faces of the points, shape (n, 3).
-        faces: index of the face of each point, shape (n,).
-        area: area that each point represents [m2].
-    """
-
-    points: Floats
-    normals: Floats
-    faces: Ints
-    area: float
+    points: Floats  #: on the mesh [m], shape (n, 3)
+    normals: Floats  #: unit outward normals of the faces of the points, shape (n, 3)
+    faces: Ints  #: index of the face of each point, shape (n,)
+    area: float  #: area that each point represents [m2]
 
     def __len__(self) -> int:
         return len(self.points)

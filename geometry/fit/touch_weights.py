@@ -30,18 +30,13 @@ _FINGER_LIFT = 0.002  # m; a fingertip above the surface, not in its seams and g
 class TouchWeights:
     """What an area of a link counts, at places on it; elsewhere as at the nearest of them.
 
-    Attributes:
-        points: places on the link, in the frame of its mesh [m], shape (n, 3).
-        weights: what an area counts there, not negative and not all 0, shape (n,).
-        name: of the map, for reports.
-
     Raises:
         GeometryError: no place, a value that is not finite, a negative weight, or nothing but zeros.
     """
 
-    points: Floats
-    weights: Floats
-    name: str = "weights"
+    points: Floats  #: places on the link, in the frame of its mesh [m], shape (n, 3)
+    weights: Floats  #: what an area counts there, not negative and not all 0, shape (n,)
+    name: str = "weights"  #: of the map, for reports
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", frozen(self.points, (None, 3), f"{self.name}: places"))

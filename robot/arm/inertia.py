@@ -46,32 +46,20 @@ Tensor = tuple[Vector, Vector, Vector]
 
 @dataclass(frozen=True, slots=True)
 class LinkInertia:
-    """Inertia of one link, in its DH frame.
+    """Inertia of one link, in its DH frame."""
 
-    Attributes:
-        mass: [kg].
-        centre: centre of mass [m].
-        tensor: inertia about the centre of mass along the axes of the DH frame [kg m^2], symmetric, 3 x 3.
-    """
-
-    mass: float
-    centre: Vector
-    tensor: Tensor
+    mass: float  #: [kg]
+    centre: Vector  #: centre of mass [m]
+    tensor: Tensor  #: inertia about the centre of mass along the axes of the DH frame [kg m^2], symmetric, 3 x 3
 
 
 @dataclass(frozen=True, slots=True)
 class ArmInertia:
-    """Inertia of an arm, and what its joints can hold.
+    """Inertia of an arm, and what its joints can hold."""
 
-    Attributes:
-        links: that move, from the base on.
-        torque: highest torque of each joint [N m].
-        rotor: inertia of each motor's rotor as the joint feels it, through the gear [kg m^2].
-    """
-
-    links: tuple[LinkInertia, ...]
-    torque: Joints
-    rotor: Joints
+    links: tuple[LinkInertia, ...]  #: that move, from the base on
+    torque: Joints  #: highest torque of each joint [N m]
+    rotor: Joints  #: inertia of each motor's rotor as the joint feels it, through the gear [kg m^2]
 
 
 def mass_matrix(model: ArmModel, inertia: ArmInertia, q: Sequence[float]) -> list[list[float]]:

@@ -77,17 +77,11 @@ def link_poses(model: ArmModel, q: Sequence[float]) -> tuple[Pose, ...]:
 
 
 class PlacedPoint(NamedTuple):
-    """Point that is fixed on a link, with a direction, in the base frame.
+    """Point that is fixed on a link, with a direction, in the base frame."""
 
-    Attributes:
-        point: where it is [m].
-        direction: unit vector that turns with the link.
-        columns: of its Jacobian [m/rad], one for each joint that moves the link, from joint 1 on.
-    """
-
-    point: Vector
-    direction: Vector
-    columns: list[Vector]
+    point: Vector  #: where it is [m]
+    direction: Vector  #: unit vector that turns with the link
+    columns: list[Vector]  #: of its Jacobian [m/rad], one for each joint that moves the link, from joint 1 on
 
     def velocity(self, qd: Sequence[float]) -> Vector:
         """Return the velocity of the point [m/s] at joint speeds [rad/s]."""

@@ -17,17 +17,11 @@ from .joints import Joints as Joints
 
 @dataclass(frozen=True, slots=True)
 class JointCurrents:
-    """What the motor currents of an arm say of the torques on its joints.
+    """What the motor currents of an arm say of the torques on its joints."""
 
-    Attributes:
-        torque_per_ampere: of each joint [N m/A].
-        min_unexplained: torque of each joint that counts as nothing, without noise and friction [N m].
-        max_unexplained: the same, however large noise and friction are [N m].
-    """
-
-    torque_per_ampere: Joints
-    min_unexplained: Joints
-    max_unexplained: Joints
+    torque_per_ampere: Joints  #: of each joint [N m/A]
+    min_unexplained: Joints  #: torque of each joint that counts as nothing, without noise and friction [N m]
+    max_unexplained: Joints  #: the same, however large noise and friction are [N m]
 
 
 @dataclass(frozen=True, slots=True)

@@ -241,16 +241,11 @@ _LINK_RADIUS = 0.06  # m from the middle line of a link to its surface
 
 @dataclass(frozen=True, slots=True)
 class ArmSweep:
-    """Place of the whole arm when a motion began.
-
-    Attributes:
-        q: joint positions then [rad].
-        corners: of its middle line then, in the base frame [m].
-    """
+    """Place of the whole arm when a motion began."""
 
     model: ArmModel
-    q: Joints
-    corners: tuple[Vector, ...]
+    q: Joints  #: joint positions then [rad]
+    corners: tuple[Vector, ...]  #: of its middle line then, in the base frame [m]
 
     @classmethod
     def begin(cls, model: ArmModel, q: Joints) -> ArmSweep:

@@ -59,13 +59,9 @@ class EndReaction(NamedTuple):
 
 
 class Release(NamedTuple):
-    """Command to let the program move the arm; acknowledged by a report "released" with the same number.
+    """Command to let the program move the arm; acknowledged by a report "released" with the same number."""
 
-    Attributes:
-        number: of the release; a guard watchdog, which lets nothing move, acknowledges it as well.
-    """
-
-    number: int
+    number: int  #: of the release; a guard watchdog, which lets nothing move, acknowledges it as well
 
     def encode(self) -> bytes:
         """Return the message."""

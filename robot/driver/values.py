@@ -11,29 +11,17 @@ from coneskin.robot.arm.joints import Joints
 
 
 class ControllerState(NamedTuple):
-    """One sample of the controller.
+    """One sample of the controller."""
 
-    Attributes:
-        time: host time at which it was read [s].
-        controller_time: the controller's own clock [s].
-        q: measured joint positions [rad].
-        qd: measured joint speeds [rad/s].
-        powered: the arm is powered and its brakes are released.
-        stopped_by_safety: the controller's own safety system holds the arm: a protective stop or worse.
-        program_running: a program runs on the controller.
-        current: measured motor currents [A]; None where the controller does not send them.
-        target_current: those that the controller expects of this motion [A]; None likewise.
-    """
-
-    time: float
-    controller_time: float
-    q: Joints
-    qd: Joints
-    powered: bool
-    stopped_by_safety: bool
-    program_running: bool
-    current: Joints | None = None
-    target_current: Joints | None = None
+    time: float  #: host time at which it was read [s]
+    controller_time: float  #: the controller's own clock [s]
+    q: Joints  #: measured joint positions [rad]
+    qd: Joints  #: measured joint speeds [rad/s]
+    powered: bool  #: the arm is powered and its brakes are released
+    stopped_by_safety: bool  #: the controller's own safety system holds the arm: a protective stop or worse
+    program_running: bool  #: a program runs on the controller
+    current: Joints | None = None  #: measured motor currents [A]; None where the controller does not send them
+    target_current: Joints | None = None  #: those that the controller expects of this motion [A]; None likewise
 
     @property
     def speed(self) -> float:
@@ -53,15 +41,10 @@ class StopPath(Enum):
 
 
 class UseStopPath(NamedTuple):
-    """Command to use a stop path.
+    """Command to use a stop path."""
 
-    Attributes:
-        path: which; DRIVER is used by ``StopProgram`` and ``EndReaction``.
-        deceleration: of the leading joint, where the path can have one [rad/s2].
-    """
-
-    path: StopPath
-    deceleration: float
+    path: StopPath  #: which; DRIVER is used by ``StopProgram`` and ``EndReaction``
+    deceleration: float  #: of the leading joint, where the path can have one [rad/s2]
 
 
 #: in the order in which they are used where coneskin moves the arm, and where another program does
@@ -70,31 +53,19 @@ EXTERNAL_PATHS = (StopPath.PROGRAM, StopPath.COMMAND, StopPath.SLIDER, StopPath.
 
 
 class JointVelocitySetpoint(NamedTuple):
-    """Speeds for the setpoint program with this token.
+    """Speeds for the setpoint program with this token."""
 
-    Attributes:
-        token: of the motion; 0 belongs to none.
-        qd: joint speeds [rad/s].
-        acceleration: of the leading joint [rad/s2].
-    """
-
-    token: int
-    qd: Joints
-    acceleration: float
+    token: int  #: of the motion; 0 belongs to none
+    qd: Joints  #: joint speeds [rad/s]
+    acceleration: float  #: of the leading joint [rad/s2]
 
 
 class SetpointProgram(NamedTuple):
-    """Command to start the program that follows setpoints, after the first of them was sent.
+    """Command to start the program that follows setpoints, after the first of them was sent."""
 
-    Attributes:
-        token: of the motion, above 0; the program ends where a setpoint carries another one.
-        deceleration: of the leading joint at the end [rad/s2].
-        watchdog_hz: setpoints that come less often than this end the program.
-    """
-
-    token: int
-    deceleration: float
-    watchdog_hz: float
+    token: int  #: of the motion, above 0; the program ends where a setpoint carries another one
+    deceleration: float  #: of the leading joint at the end [rad/s2]
+    watchdog_hz: float  #: setpoints that come less often than this end the program
 
 
 class SetSpeedSlider(NamedTuple):

@@ -17,14 +17,7 @@ from typing import Final
 
 
 class Phase(Enum):
-    """Phase of a guard.
-
-    Attributes:
-        watched: a fault has to stop the arm now.
-        brakes: a stop is under way, and the arm is not measured standing yet.
-        stands: the arm has to stand where it is, and is stopped again where it does not.
-        stopping: a stop is under way: from its cause until the arm is latched, or moves away.
-    """
+    """Phase of a guard."""
 
     STARTING = "starting"
     ACTIVE = "active"
@@ -36,10 +29,10 @@ class Phase(Enum):
     STANDING = "standing"  #: it stands, and is watched until it may be called latched
     LATCHED = "latched"
 
-    watched: bool
-    brakes: bool
-    stands: bool
-    stopping: bool
+    watched: bool  #: a fault has to stop the arm now
+    brakes: bool  #: a stop is under way, and the arm is not measured standing yet
+    stands: bool  #: the arm has to stand where it is, and is stopped again where it does not
+    stopping: bool  #: a stop is under way: from its cause until the arm is latched, or moves away
 
 
 for _phase in Phase:  # kept, because each look at a member takes Python 3.11 0.2 us, and every input asks for these
@@ -110,24 +103,15 @@ TRANSITIONS: Final[Mapping[tuple[Phase, Cue], tuple[Phase, Act]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Supervision:
-    """All that is decided about an arm under guard.
-
-    Attributes:
-        stop: number of the newest stop, counted from 1. A motion away and its end belong to the stop before.
-        why: cause of that stop, and what came of it.
-        may_move: what stopped the arm lets it move away.
-        barred: why nothing of ours moves the arm before the next stop. Empty where something may.
-        decide_by: host time until which an arm that stands waits for the place of a touch [s].
-        ending: the guard ends.
-    """
+    """All that is decided about an arm under guard."""
 
     phase: Phase = Phase.STARTING
-    stop: int = 0
-    why: str = ""
-    may_move: bool = False
-    barred: str = ""
-    decide_by: float = 0.0
-    ending: bool = False
+    stop: int = 0  #: number of the newest stop, counted from 1. A motion away and its end belong to the stop before.
+    why: str = ""  #: cause of that stop, and what came of it
+    may_move: bool = False  #: what stopped the arm lets it move away
+    barred: str = ""  #: why nothing of ours moves the arm before the next stop. Empty where something may.
+    decide_by: float = 0.0  #: host time until which an arm that stands waits for the place of a touch [s]
+    ending: bool = False  #: the guard ends
 
     def again(self, what: str) -> str:
         """Return why an arm is stopped, once there is another reason: the first, which is the cause, and the newest."""

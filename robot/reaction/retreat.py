@@ -47,23 +47,15 @@ class _Track:
 
 @dataclass(frozen=True, slots=True)
 class RetreatPlan:
-    """Plan of a retreat, made once, at the touch, for ``retreat_step``.
-
-    Attributes:
-        tracks: one for each touched point.
-        reach: of the arm, from each joint's axis [m].
-        start_time: of the touch [s].
-        space: the room that the arm has, or None.
-        sweep: where the whole arm was when the motion began; None where its way is not bounded.
-    """
+    """Plan of a retreat, made once, at the touch, for ``retreat_step``."""
 
     model: ArmModel
-    tracks: tuple[_Track, ...]
+    tracks: tuple[_Track, ...]  #: one for each touched point
     reaction: Reaction
-    reach: Joints
-    start_time: float
-    space: Workspace | None = None
-    sweep: ArmSweep | None = None
+    reach: Joints  #: of the arm, from each joint's axis [m]
+    start_time: float  #: of the touch [s]
+    space: Workspace | None = None  #: the room that the arm has, or None
+    sweep: ArmSweep | None = None  #: where the whole arm was when the motion began; None where its way is not bounded
 
     def place(self, q: Joints) -> tuple[list[PlacedPoint], float]:
         """Return where the touched points are at joint positions [rad], and how far the farthest has come [m]."""

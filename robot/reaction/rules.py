@@ -55,15 +55,10 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class RuleSet:
-    """All rules of a scene, with the default.
+    """All rules of a scene, with the default."""
 
-    Attributes:
-        default: the reaction to a touch that no rule fits.
-        rules: in the order in which they are tried.
-    """
-
-    default: Reaction
-    rules: tuple[Rule, ...] = ()
+    default: Reaction  #: the reaction to a touch that no rule fits
+    rules: tuple[Rule, ...] = ()  #: in the order in which they are tried
 
     @property
     def kinds(self) -> frozenset[str]:

@@ -20,46 +20,27 @@ BARE_SIDES = ("stop", "allowed", "fast")
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """Arm as measured at one time. Not checked: one is made in each control cycle.
+    """Arm as measured at one time. Not checked: one is made in each control cycle."""
 
-    Attributes:
-        time: of the measurement, on the clock of the guard [s].
-        q: joint positions [rad].
-        qd: joint speeds [rad/s]; empty where it stands.
-        torque: from outside on the joints [N m]. None where it is not measured.
-        doubt: largest torque that was seen on each joint while nothing touched [N m]; empty for none.
-    """
-
-    time: float
-    q: Joints
-    qd: Joints = ()
-    torque: Joints | None = None
-    doubt: Joints = ()
+    time: float  #: of the measurement, on the clock of the guard [s]
+    q: Joints  #: joint positions [rad]
+    qd: Joints = ()  #: joint speeds [rad/s]; empty where it stands
+    torque: Joints | None = None  #: from outside on the joints [N m]. None where it is not measured.
+    doubt: Joints = ()  #: largest torque that was seen on each joint while nothing touched [N m]; empty for none
 
 
 @dataclass(frozen=True, slots=True)
 class ContactOnLink:
-    """Touch on a link, as the reaction sees it.
+    """Touch on a link, as the reaction sees it."""
 
-    Attributes:
-        link: index of the DH frame that moves with the touched link, 0 (base) to the flange.
-        point: where, in that frame [m].
-        normal: outward unit normal of the skin there, in that frame; what touches is on its side.
-        level: how strong, in the detector's unit.
-        location_valid: False when it is known that there is a touch, but not where.
-        threshold: level from which the sensor is touched at all.
-        number: of the touch; one that begins anew has another.
-        firm: level from which the touch should have a place; a firmer one without is a doubtful one.
-    """
-
-    link: int
-    point: Vector
-    normal: Vector
-    level: float = 1.0
-    location_valid: bool = True
-    threshold: float = 0.0
-    number: int = 0
-    firm: float = 0.2
+    link: int  #: index of the DH frame that moves with the touched link, 0 (base) to the flange
+    point: Vector  #: where, in that frame [m]
+    normal: Vector  #: outward unit normal of the skin there, in that frame; what touches is on its side
+    level: float = 1.0  #: how strong, in the detector's unit
+    location_valid: bool = True  #: False when it is known that there is a touch, but not where
+    threshold: float = 0.0  #: level from which the sensor is touched at all
+    number: int = 0  #: of the touch; one that begins anew has another
+    firm: float = 0.2  #: level from which the touch should have a place; a firmer one without is a doubtful one
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,13 +140,8 @@ class JointVelocity:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """End of a motion, or its impossibility: brake and stand.
-
-    Attributes:
-        progress: how far the touched point got [m].
-        complete: it got as far as it was to.
-    """
+    """End of a motion, or its impossibility: brake and stand."""
 
     reason: str
-    progress: float = 0.0
-    complete: bool = False
+    progress: float = 0.0  #: how far the touched point got [m]
+    complete: bool = False  #: it got as far as it was to

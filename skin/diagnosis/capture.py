@@ -16,19 +16,12 @@ from coneskin.skin.wire import MAX_LENGTH, SYNC, Frame, frame_at
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """Bytes of a line in pieces, as they were read.
+    """Bytes of a line in pieces, as they were read."""
 
-    Attributes:
-        pieces: (host clock [s], bytes), in their order.
-        now: host clock when the capture ends [s].
-        timed: the times say something; False for bytes from a file.
-        since: host clock when the listening began [s].
-    """
-
-    pieces: Sequence[tuple[float, bytes]]
-    now: float
-    timed: bool = True
-    since: float = 0.0
+    pieces: Sequence[tuple[float, bytes]]  #: (host clock [s], bytes), in their order
+    now: float  #: host clock when the capture ends [s]
+    timed: bool = True  #: the times say something; False for bytes from a file
+    since: float = 0.0  #: host clock when the listening began [s]
 
     @property
     def data(self) -> bytes:

@@ -31,23 +31,14 @@ _MIN_TIME = 0.25  # s over which the clocks can be compared
 
 @dataclass(frozen=True, slots=True)
 class FrameNumbers:
-    """How the frames of one sensor follow each other.
+    """How the frames of one sensor follow each other."""
 
-    Attributes:
-        rate: frames a second, by the host's clock; nan where that is not known.
-        clock_ratio: speed of the device's clock over that of the host; nan where it is not known.
-        missing: share of the sequence numbers that never came.
-        period: device time from frame to frame, the middle one [s].
-        held_up: for how long this computer has left frames unread, by those that it then read at once [s].
-        hidden: it was held up for so long, or so often, that the ratio of the clocks may be 1.
-    """
-
-    rate: float
-    clock_ratio: float
-    missing: float
-    period: float
-    held_up: float
-    hidden: bool
+    rate: float  #: frames a second, by the host's clock; nan where that is not known
+    clock_ratio: float  #: speed of the device's clock over that of the host; nan where it is not known
+    missing: float  #: share of the sequence numbers that never came
+    period: float  #: device time from frame to frame, the middle one [s]
+    held_up: float  #: for how long this computer has left frames unread, by those that it then read at once [s]
+    hidden: bool  #: it was held up for so long, or so often, that the ratio of the clocks may be 1
 
 
 def measure_numbers(frames: Sequence[Frame], times: Sequence[float]) -> FrameNumbers:

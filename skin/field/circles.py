@@ -35,19 +35,12 @@ _NEAR_ALPHA = 0.25  # |alpha| of an edge that counts as near: two radii between 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _EdgeImage:
-    """One edge as each of n discs sees it.
+    """One edge as each of n discs sees it."""
 
-    Attributes:
-        arc: the edge is an arc (A or B), otherwise straight (C or D).
-        alpha: at most 1/2 in modulus where the edge is straight; 0 where it is far, shape (n,).
-        gamma: shape (n,).
-        delta: shape (n,).
-    """
-
-    arc: bool
-    alpha: Complex
-    gamma: Floats
-    delta: Floats
+    arc: bool  #: the edge is an arc (A or B), otherwise straight (C or D)
+    alpha: Complex  #: at most 1/2 in modulus where the edge is straight; 0 where it is far, shape (n,)
+    gamma: Floats  #: shape (n,)
+    delta: Floats  #: shape (n,)
 
 
 def _edge_images(sheet: SectorSheet, discs: Discs, place: int) -> list[_EdgeImage]:

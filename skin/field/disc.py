@@ -26,19 +26,12 @@ from .sheet import SectorSheet
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Discs:
-    """n scenes of k discs each; every array of shape (n, k).
+    """n scenes of k discs each; every array of shape (n, k)."""
 
-    Attributes:
-        u: slant distance of the centres [m].
-        phi: azimuth of the centres [rad].
-        radius: [m].
-        conductance: per area [S/m^2].
-    """
-
-    u: Floats
-    phi: Floats
-    radius: Floats
-    conductance: Floats
+    u: Floats  #: slant distance of the centres [m]
+    phi: Floats  #: azimuth of the centres [rad]
+    radius: Floats  #: [m]
+    conductance: Floats  #: per area [S/m^2]
 
     @classmethod
     def of(cls, discs: Sequence[Disc]) -> Discs:

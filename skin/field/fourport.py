@@ -101,17 +101,11 @@ def admittance(coupling: Coupling, upper: float, lower: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class Terminal:
-    """A Thevenin source behind a lead; the ADC reads between the two.
+    """A Thevenin source behind a lead; the ADC reads between the two."""
 
-    Attributes:
-        emf: open-circuit potential [V].
-        resistance: of the source, or of an input to `emf` [ohm]; 0 drives ideally, inf is open.
-        lead: resistance between the terminal and the electrode [ohm].
-    """
-
-    emf: float = 0.0
-    resistance: float = math.inf
-    lead: float = 0.0
+    emf: float = 0.0  #: open-circuit potential [V]
+    resistance: float = math.inf  #: of the source, or of an input to `emf` [ohm]; 0 drives ideally, inf is open
+    lead: float = 0.0  #: resistance between the terminal and the electrode [ohm]
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.emf):
@@ -124,21 +118,13 @@ class Terminal:
 
 @dataclass(frozen=True, slots=True)
 class DrivePhase:
-    """One state of the electronics: a terminal at each electrode.
+    """One state of the electronics: a terminal at each electrode."""
 
-    Attributes:
-        name: radial, angular, touch or the user's own.
-        a: terminal of electrode A, on the arc of end 2 of the upper sheet.
-        b: terminal of electrode B, on the arc of end 1 of the upper sheet.
-        c: terminal of electrode C, on the edge phi=wrap of the lower sheet.
-        d: terminal of electrode D, on the edge phi=0 of the lower sheet.
-    """
-
-    name: str
-    a: Terminal
-    b: Terminal
-    c: Terminal
-    d: Terminal
+    name: str  #: radial, angular, touch or the user's own
+    a: Terminal  #: terminal of electrode A, on the arc of end 2 of the upper sheet
+    b: Terminal  #: terminal of electrode B, on the arc of end 1 of the upper sheet
+    c: Terminal  #: terminal of electrode C, on the edge phi=wrap of the lower sheet
+    d: Terminal  #: terminal of electrode D, on the edge phi=0 of the lower sheet
 
     @property
     def terminals(self) -> tuple[Terminal, Terminal, Terminal, Terminal]:
@@ -167,20 +153,13 @@ def angular_phase(supply: float = 1.0, adc: float = math.inf, lead: float = 0.0,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Readings:
-    """The answer of one phase; axes over electrodes run A, B, C, D.
-
-    Attributes:
-        electrodes: potentials of the electrodes [V], shape (n, 4).
-        terminals: potentials of the terminals, behind the leads, where an ADC reads [V], shape (n, 4).
-        currents: from the terminals into the sensor [A], shape (n, 4).
-        contact: current from the upper to the lower sheet [A], shape (n,).
-    """
+    """The answer of one phase; axes over electrodes run A, B, C, D."""
 
     phase: DrivePhase
-    electrodes: Floats
-    terminals: Floats
-    currents: Floats
-    contact: Floats
+    electrodes: Floats  #: potentials of the electrodes [V], shape (n, 4)
+    terminals: Floats  #: potentials of the terminals, behind the leads, where an ADC reads [V], shape (n, 4)
+    currents: Floats  #: from the terminals into the sensor [A], shape (n, 4)
+    contact: Floats  #: current from the upper to the lower sheet [A], shape (n,)
 
     def __len__(self) -> int:
         return int(self.contact.shape[0])

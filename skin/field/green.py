@@ -28,17 +28,11 @@ from coneskin.core.arrays import Complex, Floats
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """The rectangle seen from its shorter side.
+    """The rectangle seen from its shorter side."""
 
-    Attributes:
-        sigma: longer side, in units of (shorter side)/pi.
-        scale: pi/(shorter side) [1/m].
-        along_x: the longer side lies along x.
-    """
-
-    sigma: float
-    scale: float
-    along_x: bool
+    sigma: float  #: longer side, in units of (shorter side)/pi
+    scale: float  #: pi/(shorter side) [1/m]
+    along_x: bool  #: the longer side lies along x
 
     @classmethod
     def of(cls, length: float, breadth: float) -> Strip:
@@ -55,23 +49,14 @@ class Strip:
 
 @dataclass(frozen=True, slots=True)
 class StripPoints:
-    """Points of the strip with the exponentials that the kernel multiplies; the last axis runs over the points.
+    """Points of the strip with the exponentials that the kernel multiplies; the last axis runs over the points."""
 
-    Attributes:
-        s: distance along s from the centre, shape (n, N).
-        direct: expm1(w - w_ref).
-        folded: expm1(w - s_ref), with p measured from the near edge.
-        near: 1 - exp(-w), measured from the near corner.
-        x_near: exp(-w).
-        x_far: exp(w - Sigma).
-    """
-
-    s: Floats
-    direct: Complex
-    folded: Complex
-    near: Complex
-    x_near: Complex
-    x_far: Complex
+    s: Floats  #: distance along s from the centre, shape (n, N)
+    direct: Complex  #: expm1(w - w_ref)
+    folded: Complex  #: expm1(w - s_ref), with p measured from the near edge
+    near: Complex  #: 1 - exp(-w), measured from the near corner
+    x_near: Complex  #: exp(-w)
+    x_far: Complex  #: exp(w - Sigma)
 
 
 def mirrored(offset: Complex, along_x: bool, flip_s: NDArray[np.bool_], flip_p: NDArray[np.bool_]) -> Complex:

@@ -28,18 +28,12 @@ from .multipole import resolution, solve_to_tolerance
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldMap:
-    """The solved field of one scene in one phase.
-
-    Attributes:
-        discs: the contacts; may be none, if the phase fixes both sheets without them.
-        electrodes: potentials of A, B, C, D [V].
-        moments: of the current of each disc [A], shape (k, 2M+1).
-    """
+    """The solved field of one scene in one phase."""
 
     model: FieldModel
-    discs: tuple[Disc, ...]
-    electrodes: tuple[float, float, float, float]
-    moments: Floats
+    discs: tuple[Disc, ...]  #: the contacts; may be none, if the phase fixes both sheets without them
+    electrodes: tuple[float, float, float, float]  #: potentials of A, B, C, D [V]
+    moments: Floats  #: of the current of each disc [A], shape (k, 2M+1)
 
     @classmethod
     def of(cls, model: FieldModel, discs: Sequence[Disc], phase: DrivePhase) -> FieldMap:
@@ -178,19 +172,12 @@ class FieldMap:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorMap:
-    """Errors of the decoded place over a grid of round contacts; NaN where the disc would not fit.
+    """Errors of the decoded place over a grid of round contacts; NaN where the disc would not fit."""
 
-    Attributes:
-        u: slant distances of the contacts [m], shape (n,).
-        phi: azimuths of the contacts [rad], shape (m,).
-        u_error: decoded minus true slant distance [m], shape (n, m).
-        phi_error: decoded minus true azimuth [rad], shape (n, m).
-    """
-
-    u: Floats
-    phi: Floats
-    u_error: Floats
-    phi_error: Floats
+    u: Floats  #: slant distances of the contacts [m], shape (n,)
+    phi: Floats  #: azimuths of the contacts [rad], shape (m,)
+    u_error: Floats  #: decoded minus true slant distance [m], shape (n, m)
+    phi_error: Floats  #: decoded minus true azimuth [rad], shape (n, m)
 
     @classmethod
     def of(cls, model: FieldModel, radius: float, u: Floats, phi: Floats, conductance: float = math.inf) -> ErrorMap:

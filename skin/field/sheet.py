@@ -45,20 +45,14 @@ def _log1p_over(kappa: float, distance: ArrayLike) -> Floats:
 class SectorSheet:
     """An annular sector (a rectangle where the curvature is zero), wrapped on a link.
 
-    Attributes:
-        width: slant width between the arcs [m].
-        curvature: signed curvature of the arc at end 1 [1/m]; positive where the link widens towards end 2.
-        arc: length of the arc at end 1, between the straight edges [m].
-        wrap: azimuth that the arc covers on the link [rad]; for a sheet that lies flat, its own sector angle.
-
     Raises:
         FieldError: a length is not positive and finite, the sheet reaches the apex, the sector exceeds a full turn.
     """
 
-    width: float
-    curvature: float
-    arc: float
-    wrap: float
+    width: float  #: slant width between the arcs [m]
+    curvature: float  #: signed curvature of the arc at end 1 [1/m]; positive where the link widens towards end 2
+    arc: float  #: length of the arc at end 1, between the straight edges [m]
+    wrap: float  #: azimuth that the arc covers on the link [rad]; for a sheet that lies flat, its own sector angle
 
     def __post_init__(self) -> None:
         for name, unit in (("width", "m"), ("arc", "m"), ("wrap", "rad")):

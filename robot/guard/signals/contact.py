@@ -41,16 +41,11 @@ class GuardedSensor:
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Touch on a link. Its place is worked out only where it is asked for, because a stop does not wait for it.
+    """Touch on a link. Its place is worked out only where it is asked for, because a stop does not wait for it."""
 
-    Attributes:
-        touch: as the skin reports it, in an event or in a frame.
-        number: of the touch, from 1 on. One that begins anew has a new number.
-    """
-
-    touch: TouchEvent | TouchReading
+    touch: TouchEvent | TouchReading  #: as the skin reports it, in an event or in a frame
     where: GuardedSensor
-    number: int
+    number: int  #: of the touch, from 1 on. One that begins anew has a new number.
 
     def on_link(self) -> ContactOnLink:
         """Return what the reaction has to know."""

@@ -19,23 +19,14 @@ from coneskin.robot.arm.vectors import cross
 
 @dataclass(frozen=True, slots=True)
 class PermissiblePatch:
-    """Patch of a skin.
+    """Patch of a skin."""
 
-    Attributes:
-        name: of its sensor.
-        link: index of the link's DH frame.
-        point: in that frame [m].
-        normal: outward unit normal in that frame.
-        curve: permissible speeds within the joint positions of the motion, for each lever [m/s].
-        any_curve: in any position [m/s].
-    """
-
-    name: str
-    link: int
-    point: Vector
-    normal: Vector
-    curve: tuple[float, ...]
-    any_curve: tuple[float, ...]
+    name: str  #: of its sensor
+    link: int  #: index of the link's DH frame
+    point: Vector  #: in that frame [m]
+    normal: Vector  #: outward unit normal in that frame
+    curve: tuple[float, ...]  #: permissible speeds within the joint positions of the motion, for each lever [m/s]
+    any_curve: tuple[float, ...]  #: in any position [m/s]
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,15 +78,10 @@ class MotionFault(Exception):
 
 
 class Motion(Protocol):
-    """Command that moves the arm.
+    """Command that moves the arm."""
 
-    Attributes:
-        done: it has come to its end.
-        brakes: it is a stop, which the checks let pass.
-    """
-
-    done: bool
-    brakes: bool
+    done: bool  #: it has come to its end
+    brakes: bool  #: it is a stop, which the checks let pass
 
     def update(self, arm: SimulatedArm, scale: float, hold: bool) -> tuple[list[float], list[float]]:
         """Return joint positions [rad] and speeds [rad/s] after one cycle.

@@ -10,21 +10,13 @@ Verdict = Literal["ok", "warning", "bad", "not tried"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of looking at one thing.
+    """Result of looking at one thing."""
 
-    Attributes:
-        item: what was looked at.
-        verdict: "bad": a guard refuses it, or goes wrong with it; "warning": it works, and not as it should.
-        value: what was found; for "not tried", why.
-        rule: what it should be.
-        remedy: what to do; empty where there is nothing.
-    """
-
-    item: str
-    verdict: Verdict
-    value: str
-    rule: str = ""
-    remedy: str = ""
+    item: str  #: what was looked at
+    verdict: Verdict  #: "bad": a guard refuses it, or goes wrong with it; "warning": it works, and not as it should
+    value: str  #: what was found; for "not tried", why
+    rule: str = ""  #: what it should be
+    remedy: str = ""  #: what to do; empty where there is nothing
 
     @property
     def line(self) -> str:

@@ -31,17 +31,11 @@ _ABSOLUTE_TOLERANCE = 1e-12  # rad/s and the like, for numbers near zero
 
 
 class _ArmCommand(NamedTuple):
-    """Command of a guard.
+    """Command of a guard."""
 
-    Attributes:
-        time: of the input that led to it, host clock [s].
-        what: such as "StopProgram", or the stop path that was used.
-        numbers: what it carries, in SI.
-    """
-
-    time: float
-    what: str
-    numbers: tuple[float, ...]
+    time: float  #: of the input that led to it, host clock [s]
+    what: str  #: such as "StopProgram", or the stop path that was used
+    numbers: tuple[float, ...]  #: what it carries, in SI
 
     def equals(self, other: _ArmCommand, tolerances: Tolerances) -> bool:
         """Tell whether the other does the same to the arm at the same time, within tolerances."""

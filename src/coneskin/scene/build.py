@@ -160,23 +160,14 @@ def _speed_limit(scene: Scene, limit: SpeedLimitScene, arm: ArmModel) -> SpeedLi
 
 @dataclass(frozen=True, slots=True)
 class SensorOnArm:
-    """Place of a sensor on the arm.
+    """Place of a sensor on the arm."""
 
-    Attributes:
-        name: of the sensor.
-        link_name: of the link.
-        link: index of the link's DH frame; 0 without an arm.
-        frustum: in that frame; without an arm, in the frame that the scene gives.
-        surface: the link's mesh below the sensor, where the scene names one.
-        model: of the arm, or None.
-    """
-
-    name: str
-    link_name: str
-    link: int
-    frustum: PlacedFrustum
-    surface: DisplacementMap | None = None
-    model: ArmModel | None = None
+    name: str  #: of the sensor
+    link_name: str  #: of the link
+    link: int  #: index of the link's DH frame; 0 without an arm
+    frustum: PlacedFrustum  #: in that frame; without an arm, in the frame that the scene gives
+    surface: DisplacementMap | None = None  #: the link's mesh below the sensor, where the scene names one
+    model: ArmModel | None = None  #: of the arm, or None
 
     def place(self, u: float, phi: float) -> tuple[Vector, Vector]:
         """Return the point [m] and the outward unit normal at u [m] and phi [rad].

@@ -28,31 +28,18 @@ _DAY_SECONDS = 86400.0  # s; by one, a record may be ahead of this computer's da
 
 @dataclass(frozen=True, slots=True)
 class MarkResult:
-    """Result of one touched mark.
+    """Result of one touched mark."""
 
-    Attributes:
-        sensor: its name.
-        where: the place in the words that the person was given.
-        u_mm: slant distance from end 1 that was expected [mm].
-        phi_deg: azimuth that was expected [deg].
-        read_u_mm: as the skin read it [mm].
-        read_phi_deg: as the skin read it [deg].
-        distance_mm: of the two along the surface [mm].
-        level: of the touch.
-        attempts: how often it was touched.
-        passed: it was read where it is, within the tolerance.
-    """
-
-    sensor: str
-    where: str
-    u_mm: float
-    phi_deg: float
-    read_u_mm: float
-    read_phi_deg: float
-    distance_mm: float
-    level: float
-    attempts: int
-    passed: bool
+    sensor: str  #: its name
+    where: str  #: the place in the words that the person was given
+    u_mm: float  #: slant distance from end 1 that was expected [mm]
+    phi_deg: float  #: azimuth that was expected [deg]
+    read_u_mm: float  #: as the skin read it [mm]
+    read_phi_deg: float  #: as the skin read it [deg]
+    distance_mm: float  #: of the two along the surface [mm]
+    level: float  #: of the touch
+    attempts: int  #: how often it was touched
+    passed: bool  #: it was read where it is, within the tolerance
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,17 +56,11 @@ class UrRtdeArm(ArmClient, UrRtdeMethods):
 
 
 class _Method(NamedTuple):
-    """One method of ur_rtde on the arm.
+    """One method of ur_rtde on the arm."""
 
-    Attributes:
-        call: takes the arm and then the method's own arguments.
-        own: what coneskin calls it, for programs that are written anew.
-        note: how it differs; empty where it does not.
-    """
-
-    call: Callable[..., Any]
-    own: str
-    note: str = ""
+    call: Callable[..., Any]  #: takes the arm and then the method's own arguments
+    own: str  #: what coneskin calls it, for programs that are written anew
+    note: str = ""  #: how it differs; empty where it does not
 
 
 def _true(call: Callable[..., object]) -> Callable[..., bool]:

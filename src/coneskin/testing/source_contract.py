@@ -36,14 +36,10 @@ _FRAME_COUNT = 75  # a pseudo-terminal holds 4 kB
 
 @dataclass(frozen=True, slots=True)
 class OpenLine:
-    """A source that is open.
-
-    Attributes:
-        pull: pulls the plug; None where the line ends by itself after its last byte.
-    """
+    """A source that is open."""
 
     source: Source
-    pull: Callable[[], None] | None = None
+    pull: Callable[[], None] | None = None  #: pulls the plug; None where the line ends by itself after its last byte
 
     def read(self, count: int) -> bytes:
         """Return so many bytes, or more.

@@ -26,17 +26,11 @@ MAX_PAYLOAD: Final = 1 << 24  #: bytes; a longer block is damage, not data
 
 
 class Block(NamedTuple):
-    """One recorded item.
+    """One recorded item."""
 
-    Attributes:
-        kind: what it is, 1..239; those above are the file's own.
-        time: host clock [s], monotonic.
-        payload: its bytes.
-    """
-
-    kind: int
-    time: float
-    payload: bytes
+    kind: int  #: what it is, 1..239; those above are the file's own
+    time: float  #: host clock [s], monotonic
+    payload: bytes  #: its bytes
 
 
 def is_time(value: object) -> TypeGuard[float]:

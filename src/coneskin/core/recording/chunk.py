@@ -25,31 +25,18 @@ LAST_BIT = 63  #: of ``ChunkHead.kinds``: this kind or one above it
 
 @dataclass(frozen=True, slots=True)
 class ChunkHead:
-    """Head of a chunk.
+    """Head of a chunk."""
 
-    Attributes:
-        length: of the body, as it is stored [bytes].
-        run: number of the recording that it belongs to.
-        sequence: its number in the recording, from 0 on, without a hole.
-        span: numbers that it stands for, 1 but where retention has made one of several.
-        blocks: that are in it.
-        kinds: bit k stands for a block of kind k, bit 63 for all from 63 on.
-        since: the smallest time of a block [s, host clock].
-        until: the largest.
-        encoding: 0 plain, 1 zlib.
-        body_crc: CRC-32 of the stored body.
-    """
-
-    length: int
-    run: int
-    sequence: int
-    span: int
-    blocks: int
-    kinds: int
-    since: float
-    until: float
-    encoding: int
-    body_crc: int
+    length: int  #: of the body, as it is stored [bytes]
+    run: int  #: number of the recording that it belongs to
+    sequence: int  #: its number in the recording, from 0 on, without a hole
+    span: int  #: numbers that it stands for, 1 but where retention has made one of several
+    blocks: int  #: that are in it
+    kinds: int  #: bit k stands for a block of kind k, bit 63 for all from 63 on
+    since: float  #: the smallest time of a block [s, host clock]
+    until: float  #: the largest
+    encoding: int  #: 0 plain, 1 zlib
+    body_crc: int  #: CRC-32 of the stored body
 
     @property
     def following(self) -> int:

@@ -41,29 +41,17 @@ _WITHOUT_INPUTS = frozenset({DefectKind.LOST, DefectKind.NOT_CLOSED, DefectKind.
 
 @dataclass(frozen=True, slots=True)
 class Defect:
-    """One defect.
+    """One defect."""
 
-    Attributes:
-        kind: what is wrong.
-        since: time of the last block before it [s, host clock]; -inf where there is none.
-        until: time of the first block after it [s]; inf where there is none.
-        offset: where it is in its file [bytes]; None where that is not known.
-        size: bytes that are damaged, or not read.
-        chunks: that are missing or in the wrong place; None where nobody knows.
-        blocks: that are missing, at least.
-        kinds: of block that are missing; None where nobody knows all of them.
-        note: more words, for people.
-    """
-
-    kind: DefectKind
-    since: float = -math.inf
-    until: float = math.inf
-    offset: int | None = None
-    size: int = 0
-    chunks: int | None = None
-    blocks: int = 0
-    kinds: frozenset[int] | None = None
-    note: str = ""
+    kind: DefectKind  #: what is wrong
+    since: float = -math.inf  #: time of the last block before it [s, host clock]; -inf where there is none
+    until: float = math.inf  #: time of the first block after it [s]; inf where there is none
+    offset: int | None = None  #: where it is in its file [bytes]; None where that is not known
+    size: int = 0  #: bytes that are damaged, or not read
+    chunks: int | None = None  #: that are missing or in the wrong place; None where nobody knows
+    blocks: int = 0  #: that are missing, at least
+    kinds: frozenset[int] | None = None  #: of block that are missing; None where nobody knows all of them
+    note: str = ""  #: more words, for people
 
     @classmethod
     def noted(cls, block: Block) -> Defect:

@@ -47,31 +47,18 @@ class Damage(NamedTuple):
 
 @dataclass(slots=True)
 class Extent:
-    """Intact chunks that follow each other in a file and in the recording; the index of a recording is made of them.
+    """Intact chunks that follow each other in a file and in the recording; the index of a recording is made of them."""
 
-    Attributes:
-        path: the file.
-        offset: of the first chunk [bytes].
-        end: of the last.
-        run: number of the recording.
-        first: number of the first chunk.
-        following: number of the chunk that must come next.
-        kinds: of them, as bits.
-        since: the smallest time [s, host clock].
-        until: the largest.
-        last_kinds: of the last chunk, as bits.
-    """
-
-    path: Path
-    offset: int
-    end: int
-    run: int
-    first: int
-    following: int
-    kinds: int
-    since: float
-    until: float
-    last_kinds: int
+    path: Path  #: the file
+    offset: int  #: of the first chunk [bytes]
+    end: int  #: of the last
+    run: int  #: number of the recording
+    first: int  #: number of the first chunk
+    following: int  #: number of the chunk that must come next
+    kinds: int  #: of them, as bits
+    since: float  #: the smallest time [s, host clock]
+    until: float  #: the largest
+    last_kinds: int  #: of the last chunk, as bits
 
     @classmethod
     def of(cls, path: Path, chunk: Chunk) -> Extent:

@@ -27,23 +27,14 @@ _SAMPLE_COUNT = 200  # joint positions of a motion that are looked at
 
 @dataclass(frozen=True, slots=True)
 class ArmPatch:
-    """Patch of a skin.
+    """Patch of a skin."""
 
-    Attributes:
-        sensor: its name.
-        link: index of the link's DH frame.
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        point: in the link's frame [m].
-        normal: outward unit normal in that frame.
-    """
-
-    sensor: str
-    link: int
-    u: float
-    phi: float
-    point: Vector
-    normal: Vector
+    sensor: str  #: its name
+    link: int  #: index of the link's DH frame
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth [rad]
+    point: Vector  #: in the link's frame [m]
+    normal: Vector  #: outward unit normal in that frame
 
 
 def patches_of(scene: Scene) -> list[ArmPatch]:

@@ -13,29 +13,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ContactState:
-    """State of a contact, in one of the straight pieces of its force.
+    """State of a contact, in one of the straight pieces of its force."""
 
-    Attributes:
-        s: compression [m].
-        w: its rate [m/s].
-        x: place of the body [m].
-        v: speed of the body [m/s].
-        way: of the controller's surface [m].
-        drive: its speed [m/s].
-        braking: its deceleration [m/s^2].
-        elastic: force of the compression at rest [N].
-        slope: of that force over the compression [N/m].
-    """
-
-    s: float
-    w: float
-    x: float
-    v: float
-    way: float
-    drive: float
-    braking: float
-    elastic: float
-    slope: float
+    s: float  #: compression [m]
+    w: float  #: its rate [m/s]
+    x: float  #: place of the body [m]
+    v: float  #: speed of the body [m/s]
+    way: float  #: of the controller's surface [m]
+    drive: float  #: its speed [m/s]
+    braking: float  #: its deceleration [m/s^2]
+    elastic: float  #: force of the compression at rest [N]
+    slope: float  #: of that force over the compression [N/m]
 
 
 _STEP_PARTS = 4  # into how many parts a step is divided; a step is shorter than half a swing
@@ -129,25 +117,15 @@ def _root(series: Sequence[float], slope: Sequence[float], low: float, high: flo
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Stretch of time within which all quantities are polynomials in the time since its beginning.
+    """Stretch of time within which all quantities are polynomials in the time since its beginning."""
 
-    Attributes:
-        start: when it begins [s].
-        duration: [s].
-        compression: coefficients, lowest power first [m].
-        rate: of the compression [m/s].
-        place: of the body [m].
-        speed: of the body [m/s].
-        force: [N].
-    """
-
-    start: float
-    duration: float
-    compression: Sequence[float]
-    rate: Sequence[float]
-    place: Sequence[float]
-    speed: Sequence[float]
-    force: Sequence[float]
+    start: float  #: when it begins [s]
+    duration: float  #: [s]
+    compression: Sequence[float]  #: coefficients, lowest power first [m]
+    rate: Sequence[float]  #: of the compression [m/s]
+    place: Sequence[float]  #: of the body [m]
+    speed: Sequence[float]  #: of the body [m/s]
+    force: Sequence[float]  #: [N]
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,66 +47,41 @@ _REGION_KEYS = (
 
 @dataclass(frozen=True, slots=True)
 class ForceLimits:
-    """Limits of the force on a body.
+    """Limits of the force on a body."""
 
-    Attributes:
-        transient: of the peak within the first 0.5 s [N].
-        lasting: of what is left then, and at rest [N].
-    """
-
-    transient: float
-    lasting: float
+    transient: float  #: of the peak within the first 0.5 s [N]
+    lasting: float  #: of what is left then, and at rest [N]
 
 
 @dataclass(frozen=True, slots=True)
 class BodyRegion:
-    """Part of a body that the arm may strike.
-
-    Attributes:
-        body: mass and stiffness.
-        links: indices of the links that may strike it; empty for all.
-    """
+    """Part of a body that the arm may strike."""
 
     name: str
-    body: StruckBody
+    body: StruckBody  #: mass and stiffness
     limits: ForceLimits
-    links: frozenset[int] = frozenset()
+    links: frozenset[int] = frozenset()  #: indices of the links that may strike it; empty for all
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredReaction:
-    """How the guarded arm stops, as somebody has measured it.
+    """How the guarded arm stops, as somebody has measured it."""
 
-    Attributes:
-        reaction: from the closing of the layers until the arm brakes [s].
-        deceleration: of the leading joint then [rad/s^2].
-        by: what measured it, and when.
-        servo: frequency of the joints' servos [Hz]; assumed where nobody has measured it.
-    """
-
-    reaction: float
-    deceleration: float
-    by: str
-    servo: float = 17.0
+    reaction: float  #: from the closing of the layers until the arm brakes [s]
+    deceleration: float  #: of the leading joint then [rad/s^2]
+    by: str  #: what measured it, and when
+    servo: float = 17.0  #: frequency of the joints' servos [Hz]; assumed where nobody has measured it
 
 
 @dataclass(frozen=True, slots=True)
 class LimitsFile:
-    """Content of a limits file.
+    """Content of a limits file."""
 
-    Attributes:
-        edition: document and edition that the limits are from.
-        transcribed_by: who copied them from it.
-        verified_by: who compared them with it.
-        regions: that may be struck.
-        measured: how the arm stops.
-    """
-
-    edition: str
-    transcribed_by: str
-    verified_by: str
-    regions: tuple[BodyRegion, ...]
-    measured: MeasuredReaction
+    edition: str  #: document and edition that the limits are from
+    transcribed_by: str  #: who copied them from it
+    verified_by: str  #: who compared them with it
+    regions: tuple[BodyRegion, ...]  #: that may be struck
+    measured: MeasuredReaction  #: how the arm stops
 
 
 def read_limits(path: Path | str) -> LimitsFile:

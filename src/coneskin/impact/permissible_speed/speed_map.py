@@ -126,36 +126,22 @@ _MOTION_MARGIN = 0.05  # rad around a motion, within which its curves hold
 
 @dataclass(frozen=True, slots=True)
 class _SpeedCurve:
-    """Permissible speeds for a range of masses.
+    """Permissible speeds for a range of masses."""
 
-    Attributes:
-        region: of the body that allows the least, at the longest lever.
-        mass: heaviest of the arm [kg].
-        extra: way that a surface goes at most beyond that of one driven mass.
-        speeds: for each of ``LEVERS`` [m/s].
-    """
-
-    region: str
-    mass: float
-    extra: ExtraWay
-    speeds: tuple[float, ...]
+    region: str  #: of the body that allows the least, at the longest lever
+    mass: float  #: heaviest of the arm [kg]
+    extra: ExtraWay  #: way that a surface goes at most beyond that of one driven mass
+    speeds: tuple[float, ...]  #: for each of ``LEVERS`` [m/s]
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedMap:
-    """Map of one scene.
+    """Map of one scene."""
 
-    Attributes:
-        table: as a scene takes it.
-        curves: of the table.
-        patches: of the skins, in the order of the table.
-        masses: of the arm at each patch [kg], the heaviest.
-    """
-
-    table: SpeedLimitScene
-    curves: tuple[_SpeedCurve, ...]
-    patches: tuple[ArmPatch, ...]
-    masses: tuple[float, ...]
+    table: SpeedLimitScene  #: as a scene takes it
+    curves: tuple[_SpeedCurve, ...]  #: of the table
+    patches: tuple[ArmPatch, ...]  #: of the skins, in the order of the table
+    masses: tuple[float, ...]  #: of the arm at each patch [kg], the heaviest
 
 
 def contact_at(

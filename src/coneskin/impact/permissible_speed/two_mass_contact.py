@@ -66,20 +66,14 @@ class DrivenArm:
 class StruckBody:
     """Body that the arm strikes. Its values are the user's: none is known that holds for every person.
 
-    Attributes:
-        mass: effective mass [kg]; infinite for one that cannot give way.
-        tissue: stiffness of what is between its surface and its mass [N/m]; infinite for none.
-        support: stiffness of the spring that holds it [N/m]; 0 for a free one.
-        damping: of that spring [N s/m].
-
     Raises:
         SensorError: a value is out of its range.
     """
 
-    mass: float
-    tissue: float = math.inf
-    support: float = 0.0
-    damping: float = 0.0
+    mass: float  #: effective mass [kg]; infinite for one that cannot give way
+    tissue: float = math.inf  #: stiffness of what is between its surface and its mass [N/m]; infinite for none
+    support: float = 0.0  #: stiffness of the spring that holds it [N/m]; 0 for a free one
+    damping: float = 0.0  #: of that spring [N s/m]
 
     def __post_init__(self) -> None:
         _check("body.mass", self.mass, "kg", above=True, infinite=True)
@@ -119,21 +113,13 @@ class _CompressionLaw:
 
 @dataclass(frozen=True, slots=True)
 class TwoMassContact:
-    """One contact.
+    """One contact."""
 
-    Attributes:
-        arm: that is driven into the body.
-        body: that it strikes.
-        padding: of the skin between them.
-        closing_force: at which the layers of the sensor close [N].
-        law: of the compression; follows from padding and body.
-    """
-
-    arm: DrivenArm
-    body: StruckBody
-    padding: Padding = field(default_factory=Padding)
-    closing_force: float = _CLOSING_FORCE
-    law: _CompressionLaw = field(init=False)
+    arm: DrivenArm  #: that is driven into the body
+    body: StruckBody  #: that it strikes
+    padding: Padding = field(default_factory=Padding)  #: of the skin between them
+    closing_force: float = _CLOSING_FORCE  #: at which the layers of the sensor close [N]
+    law: _CompressionLaw = field(init=False)  #: of the compression; follows from padding and body
 
     def __post_init__(self) -> None:
         _check("closing_force", self.closing_force, "N")

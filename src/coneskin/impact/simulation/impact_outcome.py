@@ -110,25 +110,15 @@ _STANDSTILL_TIME = 0.005  # s for which all must; a reaction moves the arm again
 
 @dataclass(frozen=True, slots=True)
 class ImpactOutcome:
-    """Outcome of one collision. Times count from the first contact.
+    """Outcome of one collision. Times count from the first contact."""
 
-    Attributes:
-        peak: greatest force of one skin on one body [N].
-        clamp: sum of all forces after ``CLAMP_TIME`` [N].
-        impulse: of all forces until then [N s].
-        depth: greatest indentation of the padding [m].
-        approach: speed of the surfaces towards each other as they met [m/s].
-        noticed: when the guard, or the force limit, gave its first command [s]; NaN where it gave none.
-        standstill: when the arm first stood, measured [s]; NaN where it did not.
-    """
-
-    peak: float
-    clamp: float
-    impulse: float
-    depth: float
-    approach: float
-    noticed: float
-    standstill: float
+    peak: float  #: greatest force of one skin on one body [N]
+    clamp: float  #: sum of all forces after ``CLAMP_TIME`` [N]
+    impulse: float  #: of all forces until then [N s]
+    depth: float  #: greatest indentation of the padding [m]
+    approach: float  #: speed of the surfaces towards each other as they met [m/s]
+    noticed: float  #: when the guard, or the force limit, gave its first command [s]; NaN where it gave none
+    standstill: float  #: when the arm first stood, measured [s]; NaN where it did not
 
 
 class ImpactMeter:

@@ -33,10 +33,6 @@ class LivePlant(OwnedProcess):
         scene: with an arm, a virtual skin and bodies.
         q: joint positions at the start [rad].
 
-    Attributes:
-        controller: line for ``SimulatedController(plant=...)``.
-        skin: line for ``guard(pressed_by=...)``.
-
     Raises:
         MissingExtra: on entry, MuJoCo is not installed.
         RobotRefused: on entry, there can be no plant of this scene; the message says why.
@@ -45,8 +41,8 @@ class LivePlant(OwnedProcess):
     """
 
     _process_name = "the physics"
-    controller: socket.socket
-    skin: socket.socket
+    controller: socket.socket  #: line for ``SimulatedController(plant=...)``
+    skin: socket.socket  #: line for ``guard(pressed_by=...)``
 
     def __init__(self, scene: Scene, q: Sequence[float]) -> None:
         self._start = {"scene": scene.text, "name": scene.name, "folder": str(scene.folder.resolve()), "q": list(q)}

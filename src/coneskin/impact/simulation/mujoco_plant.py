@@ -34,17 +34,11 @@ _FORCE_BAND = 100.0  # N from the force wanted, at which a person moves at full 
 
 @dataclass
 class _HeldPart:
-    """Part of a body on a spring, and where that spring rests.
+    """Part of a body on a spring, and where that spring rests."""
 
-    Attributes:
-        body: of the scene.
-        part: 1 for the second hand of a grip.
-        rest: how far the spring's rest has been moved [m].
-    """
-
-    body: BodyScene
-    part: int = 0
-    rest: Vector = (0.0, 0.0, 0.0)
+    body: BodyScene  #: of the scene
+    part: int = 0  #: 1 for the second hand of a grip
+    rest: Vector = (0.0, 0.0, 0.0)  #: how far the spring's rest has been moved [m]
     _towards: Vector = field(default=(0.0, 0.0, 0.0))
 
     @property

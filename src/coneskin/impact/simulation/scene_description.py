@@ -84,17 +84,11 @@ _SMALLEST_NUMBER = 1e-9  # kg m^2 and the like, where MuJoCo wants a number abov
 
 @dataclass(frozen=True, slots=True)
 class SheetOnLink:
-    """Skin on a link of the arm.
+    """Skin on a link of the arm."""
 
-    Attributes:
-        name: of its sensor.
-        link: index of the link's DH frame.
-        cone: its surface in that frame.
-    """
-
-    name: str
-    link: int
-    cone: PlacedFrustum
+    name: str  #: of its sensor
+    link: int  #: index of the link's DH frame
+    cone: PlacedFrustum  #: its surface in that frame
 
 
 def describe_scene(

@@ -19,21 +19,13 @@ _RAD_PER_DEG = math.pi / 180.0  # rad
 
 
 class _Quantity(NamedTuple):
-    """Kind of number.
+    """Kind of number."""
 
-    Attributes:
-        si_unit: as in names of columns, such as "m"; empty for a ratio.
-        factor: by which a value in SI is multiplied for people.
-        unit: of the product.
-        digits: after the decimal point.
-        tolerance: the field of ``Tolerances`` that holds for it.
-    """
-
-    si_unit: str
-    factor: float
-    unit: str
-    digits: int
-    tolerance: str
+    si_unit: str  #: as in names of columns, such as "m"; empty for a ratio
+    factor: float  #: by which a value in SI is multiplied for people
+    unit: str  #: of the product
+    digits: int  #: after the decimal point
+    tolerance: str  #: the field of ``Tolerances`` that holds for it
 
 
 _LENGTH_QUANTITY = _Quantity("m", 1e3, "mm", 1, "place")
@@ -55,22 +47,14 @@ class Tolerances:
     """Largest differences that do not count.
 
     The defaults let another machine's sine and cosine differ in the last bits, and nothing else.
-
-    Attributes:
-        place: of a length [m].
-        angle: [rad].
-        level: of a touch, and of any other ratio.
-        speed: of a joint [rad/s].
-        time: of an event [s].
-        relative: of any other number, as a ratio of it.
     """
 
-    place: float = 1e-9
-    angle: float = 1e-9
-    level: float = 1e-9
-    speed: float = 1e-9
-    time: float = 1e-9
-    relative: float = 1e-9
+    place: float = 1e-9  #: of a length [m]
+    angle: float = 1e-9  #: [rad]
+    level: float = 1e-9  #: of a touch, and of any other ratio
+    speed: float = 1e-9  #: of a joint [rad/s]
+    time: float = 1e-9  #: of an event [s]
+    relative: float = 1e-9  #: of any other number, as a ratio of it
 
     @classmethod
     def from_words(cls, words: Iterable[str]) -> Tolerances:

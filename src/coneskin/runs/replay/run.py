@@ -97,19 +97,12 @@ _HEADER_TYPES = {"scene": str, "name": str, "folder": str, "clocks": dict}
 
 
 class _FoundTouch(NamedTuple):
-    """Touch that was found in what is left of a run.
+    """Touch that was found in what is left of a run."""
 
-    Attributes:
-        sensor: its name.
-        began: host time of the frame with which it began [s].
-        ended: of the frame with which it ended [s]; inf where the run ended first.
-        peak: the largest level.
-    """
-
-    sensor: str
-    began: float
-    ended: float
-    peak: float
+    sensor: str  #: its name
+    began: float  #: host time of the frame with which it began [s]
+    ended: float  #: of the frame with which it ended [s]; inf where the run ended first
+    peak: float  #: the largest level
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,19 +38,12 @@ _EARLY_TIME = 0.25  # s before a recorded contact in which a more sensitive guar
 
 
 class _TouchLabel(NamedTuple):
-    """One touch that there was.
+    """One touch that there was."""
 
-    Attributes:
-        start: when it begins [s since the start of the run].
-        end: when it is over.
-        sensor: name of the touched sensor; empty for any.
-        early: how long before the start a contact still counts as this touch [s].
-    """
-
-    start: float
-    end: float
-    sensor: str = ""
-    early: float = 0.0
+    start: float  #: when it begins [s since the start of the run]
+    end: float  #: when it is over
+    sensor: str = ""  #: name of the touched sensor; empty for any
+    early: float = 0.0  #: how long before the start a contact still counts as this touch [s]
 
 
 def _read_labels(path: Path) -> list[_TouchLabel]:

@@ -29,21 +29,13 @@ _HOW_TO = "see `coneskin calibrate`"
 
 @dataclass(frozen=True, slots=True)
 class TouchResult:
-    """Result of one touch of a calibration.
+    """Result of one touch of a calibration."""
 
-    Attributes:
-        u_mm: slant distance of the mark from end 1 [mm].
-        phi_deg: azimuth of the mark [deg].
-        read_u_mm: as the sensor decoded it, without a map [mm].
-        read_phi_deg: as the sensor decoded it, without a map [deg].
-        used: False where it misses what most others say.
-    """
-
-    u_mm: float
-    phi_deg: float
-    read_u_mm: float
-    read_phi_deg: float
-    used: bool
+    u_mm: float  #: slant distance of the mark from end 1 [mm]
+    phi_deg: float  #: azimuth of the mark [deg]
+    read_u_mm: float  #: as the sensor decoded it, without a map [mm]
+    read_phi_deg: float  #: as the sensor decoded it, without a map [deg]
+    used: bool  #: False where it misses what most others say
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,21 +88,13 @@ class BodyScene:
 
 @dataclass(frozen=True, slots=True)
 class LimitedPatch:
-    """Patch of a skin whose speed is limited.
+    """Patch of a skin whose speed is limited."""
 
-    Attributes:
-        sensor: its name.
-        u: slant distance from end 1 [m].
-        phi: azimuth [rad].
-        curve: number of the curve that holds within the joint positions of the motion.
-        any_curve: number of the one that holds in any.
-    """
-
-    sensor: str
-    u: float
-    phi: float
-    curve: int
-    any_curve: int
+    sensor: str  #: its name
+    u: float  #: slant distance from end 1 [m]
+    phi: float  #: azimuth [rad]
+    curve: int  #: number of the curve that holds within the joint positions of the motion
+    any_curve: int  #: number of the one that holds in any
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,31 +179,20 @@ class ArmScene:
 
 @dataclass(frozen=True, slots=True)
 class PlacedSensor:
-    """Sensor and its place.
-
-    Attributes:
-        placed: its frustum in the frame of the link's mesh, or of its DH frame.
-    """
+    """Sensor and its place."""
 
     sensor: Sensor
-    placed: PlacedFrustum
+    placed: PlacedFrustum  #: its frustum in the frame of the link's mesh, or of its DH frame
 
 
 @dataclass(frozen=True, slots=True)
 class LinkScene:
-    """Link of the arm that carries sensors.
+    """Link of the arm that carries sensors."""
 
-    Attributes:
-        name: its name in the arm's URDF, such as "forearm".
-        frame: "mesh", "urdf" or "dh": what the poses of its sensors refer to.
-        mesh: the file of its mesh, or None.
-        sensors: on the link.
-    """
-
-    name: str
-    frame: str
-    mesh: Path | None
-    sensors: tuple[PlacedSensor, ...]
+    name: str  #: its name in the arm's URDF, such as "forearm"
+    frame: str  #: "mesh", "urdf" or "dh": what the poses of its sensors refer to
+    mesh: Path | None  #: the file of its mesh, or None
+    sensors: tuple[PlacedSensor, ...]  #: on the link
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,19 +228,12 @@ class RecordingScene:
 
 @dataclass(frozen=True, slots=True)
 class MotionScene:
-    """Motion that the guard itself makes, over and over: for tests and demonstrations.
+    """Motion that the guard itself makes, over and over: for tests and demonstrations."""
 
-    Attributes:
-        waypoints: joint positions [rad].
-        speed: of the leading joint [rad/s].
-        acceleration: of the leading joint [rad/s2].
-        rounds: their number; 0 for no end.
-    """
-
-    waypoints: tuple[tuple[float, ...], ...]
-    speed: float
-    acceleration: float
-    rounds: int
+    waypoints: tuple[tuple[float, ...], ...]  #: joint positions [rad]
+    speed: float  #: of the leading joint [rad/s]
+    acceleration: float  #: of the leading joint [rad/s2]
+    rounds: int  #: their number; 0 for no end
 
 
 @dataclass(frozen=True, slots=True)
