@@ -202,7 +202,7 @@ def load_mesh(path: str | Path, unit: str | None = None, scale: tuple[float, flo
     metres = None if unit is None else UNITS[unit]
     asset = None
     if path.suffix.lower() == ".dae":
-        refuse_entities(data, path)
+        _refuse_entities(data, path)
         asset = _read_collada_asset(path, data)
         if asset.up_axis != "Z_UP":
             notes.append(f"the file declares {asset.up_axis}; its axes are kept, as in RViz and MoveIt")
@@ -314,7 +314,7 @@ def _numbered_anew(faces: Ints, count: int) -> tuple[Bools, Ints]:
     return used, (np.cumsum(used) - 1)[faces]
 
 
-def refuse_entities(data: bytes, path: Path) -> None:
+def _refuse_entities(data: bytes, path: Path) -> None:
     """Refuse an XML text that defines entities: they could name other files, or grow a thousandfold.
 
     Raises:

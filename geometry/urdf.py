@@ -18,7 +18,7 @@ import numpy as np
 from coneskin.core.errors import MeshError, needed_package
 from coneskin.core.files import read_file
 
-from .mesh import Mesh, load_mesh, make_mesh, refuse_entities
+from .mesh import Mesh, _refuse_entities, load_mesh, make_mesh
 from .pose import Pose, Vector
 
 
@@ -213,7 +213,7 @@ def _robot(
     """Return the root of a URDF; a xacro file is expanded first."""
     try:
         data = read_file(path, MAX_SIZE)
-        refuse_entities(data, path)
+        _refuse_entities(data, path)
         root = ElementTree.fromstring(data)
         if root.tag == "robot" and any("xacro" in str(item.tag) for item in root.iter()):
             root = ElementTree.fromstring(_expand_xacro(path, arguments, packages))

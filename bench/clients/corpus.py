@@ -23,7 +23,7 @@ from coneskin.robot.sim.machine.builtins import Builtins
 from coneskin.robot.sim.machine.controller import Controller
 from coneskin.robot.sim.machine.states import Options
 from coneskin.robot.sim.ports.rtde import RtdeOutputs
-from coneskin.robot.sim.ports.user_interface import ProgramFolder
+from coneskin.robot.sim.ports.user_interface import _ProgramFolder
 from coneskin.robot.sim.urscript.translator import translate
 from coneskin.robot.sim.urscript.values import ScriptError
 
@@ -57,7 +57,7 @@ def run_with(model: str, root: Path, path: Path, seconds: float) -> Found:
     RtdeOutputs(controller)  # for get_rtde_value
     why = ""
     try:
-        made = translate(ProgramFolder(path.parent).load(path.name).text, Builtins.functions())
+        made = translate(_ProgramFolder(path.parent).load(path.name).text, Builtins.functions())
         controller.program_arrived()
         controller.load(made)
         for _ in range(round(seconds / controller.steptime)):

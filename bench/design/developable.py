@@ -18,7 +18,7 @@ import numpy as np
 from bench.report import head
 from coneskin.geometry.fit.candidates import sample_link
 from coneskin.geometry.fit.cones import fit_cones
-from coneskin.geometry.fit.developable.packing import with_developables
+from coneskin.geometry.fit.developable.packing import _with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.pose import Pose
 from tests.support.ruled_tube import RuledTube, ellipse_section, rounded_box_section, stadium_section
@@ -46,7 +46,7 @@ def row(name: str, tube: RuledTube, kind: str) -> str:
     link = sample_link(mesh, options, lambda _: None)
     cones = fit_cones(link, options, lambda _: None)
     middle = time.perf_counter()
-    fit = with_developables(link, cones, options)
+    fit = _with_developables(link, cones, options)
     end = time.perf_counter()
     shares = [sum(sheet.area_share for sheet in found.sheets) for found in (cones, fit)]
     text = f"| {name} | {kind} | {shares[0]:.1%} | {shares[1]:.1%} "

@@ -27,7 +27,7 @@ from bench.report import head, show
 from coneskin.geometry.drawing.layer_stack import PAPER_STACK
 from coneskin.geometry.fit.candidates import sample_link
 from coneskin.geometry.fit.cones import fit_cones
-from coneskin.geometry.fit.developable.packing import with_developables
+from coneskin.geometry.fit.developable.packing import _with_developables
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
@@ -137,7 +137,7 @@ def main() -> None:
         options = FitOptions()
         link = sample_link(mesh, options, lambda _: None)
         cones = fit_cones(link, options, lambda _: None)
-        places[name] = with_developables(link, cones, options).sheets[0].placed
+        places[name] = _with_developables(link, cones, options).sheets[0].placed
     height = PAPER_STACK.offset(4)
     rows = []
     for name, place in places.items():

@@ -26,7 +26,7 @@ from typing import Any
 
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.virtual.command import parse_fault
+from coneskin.skin.virtual.command import _parse_fault
 from coneskin.skin.virtual.fault_injection import FaultInjection, FaultyLine
 from coneskin.skin.virtual.pseudo_terminal import open_raw_terminal, wait_for_reader, write_all
 from coneskin.skin.virtual.scripted_touch import ScriptedTouch
@@ -126,7 +126,7 @@ class FaultySkin:
         known = {}
         for name, value in values.items():
             if isinstance(value, str):
-                name, value = parse_fault(f"{name}={value}")
+                name, value = _parse_fault(f"{name}={value}")
             known[name] = value + self._index if name.endswith("_after") else value
         self._skin.faults = self._line.faults = FaultInjection(**known)
 

@@ -13,7 +13,7 @@ import argparse
 import random
 
 from bench.report import head, quantile, show
-from coneskin.impact.permissible_speed.speed_map import permissible_speed, speed_within_spread
+from coneskin.impact.permissible_speed.speed_map import _speed_within_spread, permissible_speed
 from tests.support.foams import KINDS, judge, off, random_case
 
 TRUSTED_COUNT = 60  #: cases that are also judged at the speed of a table that is taken as exact
@@ -30,7 +30,7 @@ def main() -> None:
     slower, plain = [], 0
     for number in range(args.cases):
         foam, region, at = random_case(chance)
-        speed = speed_within_spread(lambda v, padding, at=at: [at(v, padding)], foam, region.limits)
+        speed = _speed_within_spread(lambda v, padding, at=at: [at(v, padding)], foam, region.limits)
         if speed <= 0.0:
             continue
         kind = KINDS[number % len(KINDS)]

@@ -33,7 +33,7 @@ CALLS = {
     "r": ("connects ur_rtde", ("coneskin.robot.ur.ur_rtde:UrArm.__enter__",)),
     "q": ("asks which arm it is", ("coneskin.robot.ur.model_check:check_model",)),
     "g": ("guards", ("coneskin.robot.guard.loop:GuardLoop.run",)),
-    "d": ("serves", ("coneskin.robot.ur.driver_process:DriverProcess.run",)),
+    "d": ("serves", ("coneskin.robot.ur.driver_process:_DriverProcess.run",)),
 }
 
 

@@ -27,12 +27,12 @@ from bench.decode.cells import electronics
 from bench.decode.plants import SHEETS
 from bench.decode.runs import FRAME_PERIOD, LEARNED_FRAMES, Sitting, decode, packet
 from bench.report import head, quantile, show
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.examination.skin_examination import SkinStatistics, examine_sensor
 from coneskin.skin.detection.frame.contact_matrix import FrameInversion
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, IDEAL_SHEETS, SheetTolerance
-from coneskin.skin.virtual.built_sheets import BuiltSheets, SheetFlaws, draw_flaws
+from coneskin.skin.virtual.built_sheets import _BuiltSheets, _draw_flaws, _SheetFlaws
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from tests.support.field.converter_plant import ConverterPlant, leak_admittance
@@ -221,14 +221,14 @@ def _doctor(sensor: Sensor, now: np.ndarray) -> str:
 
 def _specimen(
     row: Row, seed: int, rng: random.Random, base: ConverterPlant, exact_field: FieldContacts
-) -> tuple[ConverterPlant, BuiltSheets | FieldContacts]:
+) -> tuple[ConverterPlant, _BuiltSheets | FieldContacts]:
     """Draw a skin."""
     circuit = replace(base, leads=tuple(1.0 + abs(rng.gauss(0.0, row.leads)) for _ in range(4)))
-    flaws = draw_flaws(row.sheets, seed)
+    flaws = _draw_flaws(row.sheets, seed)
     if row.peeled:
         flaws = replace(flaws[0], peeled=row.peeled), flaws[1]
-    ideal = flaws == (SheetFlaws(seed=flaws[0].seed), SheetFlaws(seed=flaws[1].seed))
-    return circuit, exact_field if ideal else BuiltSheets(flaws, exact_field)
+    ideal = flaws == (_SheetFlaws(seed=flaws[0].seed), _SheetFlaws(seed=flaws[1].seed))
+    return circuit, exact_field if ideal else _BuiltSheets(flaws, exact_field)
 
 
 class Knowledge:
@@ -237,7 +237,7 @@ class Knowledge:
     def __init__(self) -> None:
         self.base, self.field = electronics(NAME)[ELECTRIC], FieldContacts()
         self.sensor = Sitting(SHEETS[NAME], self.base, np.zeros((0, 10)), np.zeros((0, 0, 10))).sensor()
-        marks = (mark.place for mark in calibration_marks(self.sensor))
+        marks = (mark.place for mark in _calibration_marks(self.sensor))
         self.marks = [LayerContact(*place, 2e-3, 5e-3, 5e-3) for place in marks]
         self.ideal = self.admittances(self.field)
         self.exact = self.base.exact(self.ideal)
@@ -255,7 +255,7 @@ class Knowledge:
         sheets = (replace(self.sensor, **{name: value}) for name, value in grown.items())
         self.shared = [(self.moved(made, lambda c: c) - self.exact) / STEP for made in sheets]
 
-    def admittances(self, sheets: BuiltSheets | FieldContacts) -> np.ndarray:
+    def admittances(self, sheets: _BuiltSheets | FieldContacts) -> np.ndarray:
         """Return Y untouched, and touched at each mark."""
         return np.array(sheets.admittances(self.sensor, [[], *([mark] for mark in self.marks)]))
 
@@ -319,7 +319,7 @@ def _places(sensor: Sensor, rng: random.Random, speed: float) -> np.ndarray:
 
 
 def _touch(
-    sheets: BuiltSheets | FieldContacts, sensor: Sensor, way: np.ndarray, rng: random.Random, row: Row, still: Frames
+    sheets: _BuiltSheets | FieldContacts, sensor: Sensor, way: np.ndarray, rng: random.Random, row: Row, still: Frames
 ) -> np.ndarray:
     """Return Y frame by frame [S]."""
     radius, siemens = rng.uniform(0.003, 0.008), math.exp(rng.uniform(math.log(7e-4), math.log(3e-3)))

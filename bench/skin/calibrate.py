@@ -27,7 +27,7 @@ from itertools import product
 import numpy as np
 
 from bench.report import head, quantile, show
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.calibration.fit import KnownTouch, fit_map
 from coneskin.commissioning.misreadings import Place
 from coneskin.core.errors import SkinError
@@ -36,7 +36,7 @@ from coneskin.skin.detection.frame.reading import read
 from coneskin.skin.electronics import LeadOhms
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, SheetTolerance
-from coneskin.skin.virtual.built_sheets import BuiltSheet, draw_flaws
+from coneskin.skin.virtual.built_sheets import _BuiltSheet, _draw_flaws
 from coneskin.skin.virtual.circuit import LayerContact, ResistorLadder
 from coneskin.skin.virtual.imperfections import Imperfections
 from coneskin.skin.virtual.skin import VirtualSkin
@@ -69,7 +69,7 @@ class Bench:
     def known_touches(self, count: int) -> list[KnownTouch]:
         """Touch marks that are not quite where they should be."""
         touches = []
-        for mark in calibration_marks(self.known, count):
+        for mark in _calibration_marks(self.known, count):
             around = self.rng.gauss(0.0, MARK_ERROR) / self.cone.radius_at(mark.u)
             true = Place(mark.u + self.rng.gauss(0.0, MARK_ERROR), mark.phi + around)
             touches.append(KnownTouch(mark.place, self.touch(true, MARK_FRAMES)))
@@ -134,9 +134,9 @@ class BuiltSkins:
     def _draw(self, tolerance: SheetTolerance, seed: int) -> tuple[np.ndarray, np.ndarray]:
         rng = random.Random(f"leads {seed}")
         found = []
-        for number, flaws in enumerate(draw_flaws(tolerance, seed)):
+        for number, flaws in enumerate(_draw_flaws(tolerance, seed)):
             size = self.size if number == 0 else self.size[::-1]
-            sheet = BuiltSheet(flaws, size, self.known.upper_sheet_ohms)
+            sheet = _BuiltSheet(flaws, size, self.known.upper_sheet_ohms)
             before, after = (abs(rng.gauss(0.0, tolerance.lead)) for _ in range(2))
             ohms = 1.0 / sheet.own[1, 1]
             nodes = math.isqrt(len(sheet.answer))
@@ -180,7 +180,7 @@ class BuiltSkins:
 
     def fitted(self, count: int) -> tuple[float, float, int]:
         """Return the rms error after ``fit_map`` [mm], what it claims over that, and how many skins it refused."""
-        marks = [(m.u / self.size[0], m.phi / self.known.frustum.wrap) for m in calibration_marks(self.known, count)]
+        marks = [(m.u / self.size[0], m.phi / self.known.frustum.wrap) for m in _calibration_marks(self.known, count)]
         touched, squares, claims, refused = self.at(marks), [], [], 0
         none = np.zeros(2)
         for skin in range(self.first, self.skins):
@@ -209,7 +209,7 @@ class BuiltSkins:
         found = []
         for count in MARK_COUNTS:
             marks = [
-                (m.u / self.size[0], m.phi / self.known.frustum.wrap) for m in calibration_marks(self.known, count)
+                (m.u / self.size[0], m.phi / self.known.frustum.wrap) for m in _calibration_marks(self.known, count)
             ]
             error, claim, refused = self.fitted(count)
             bounds = self.bound(marks), self.bound(self.best(count))

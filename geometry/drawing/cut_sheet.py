@@ -19,7 +19,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.placed_frustum import PlacedFrustum
 
-from .electrode_layout import SheetLayout, SurfaceRectangle, edge_room
+from .electrode_layout import SheetLayout, SurfaceRectangle, _edge_room
 from .layer_stack import LayerStack, snap_to_cylinder
 from .outline import Outline, circle_outline, joint_bounds
 from .part_labels import PartLabel, part_labels, strip_label
@@ -174,10 +174,10 @@ def cut_sheets(
             f"an overlap must be at most {_WIDEST_FLAP:.0%} of the narrow end, {_WIDEST_FLAP * around * 1e3:.4g} mm, "
             f"got {overlap * 1e3:.4g} mm"
         )
-    if overlap and overlap >= edge_room(layout.sheet):
+    if overlap and overlap >= _edge_room(layout.sheet):
         raise GeometryError(
             f"an overlap of {overlap * 1e3:.4g} mm runs into the other edge of the flat pattern, "
-            f"{edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
+            f"{_edge_room(layout.sheet) * 1e3:.4g} mm away: make it narrower"
         )
     plain = _ascii_text(title)[:_LONGEST_TITLE]
     place = place or PlacedFrustum(layout.sheet)

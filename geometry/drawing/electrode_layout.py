@@ -172,10 +172,10 @@ def lay_out_sheet(sheet: Frustum, plan: ElectrodePlan | None = None) -> SheetLay
     p_all, q_all = (sheet.slant, sheet.wrap) if at_end else (sheet.wrap, sheet.slant)
     mp, ep, sp = plan.margin * p_unit, plan.electrode * p_unit, plan.setback * p_unit
     mq, eq, sq = plan.margin * q_unit, plan.electrode * q_unit, plan.setback * q_unit
-    if plan.tab and not at_end and edge_room(sheet) < plan.tab + plan.clearance:
+    if plan.tab and not at_end and _edge_room(sheet) < plan.tab + plan.clearance:
         raise GeometryError(
             f"tabs of {plan.tab * 1e3:.4g} mm at {plan.wires} run into the other edge of the flat pattern, "
-            f"{edge_room(sheet) * 1e3:.4g} mm away: let the wires leave at an end"
+            f"{_edge_room(sheet) * 1e3:.4g} mm away: let the wires leave at an end"
         )
     spread = _spread(sheet, plan, narrow) if at_end else 1.0
     lead, clear = plan.lead * spread, plan.clearance * spread
@@ -282,7 +282,7 @@ def _spread(sheet: Frustum, plan: ElectrodePlan, narrow: float) -> float:
     return 1.0 / min(narrow, tip)
 
 
-def edge_room(sheet: Frustum) -> float:
+def _edge_room(sheet: Frustum) -> float:
     """Return the room beside an edge up to the other edge of the flat pattern [m]; infinite on a cylinder."""
     taper = abs(sheet.sin_half_angle)
     opening = 2.0 * math.pi - sheet.wrap * taper

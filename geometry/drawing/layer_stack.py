@@ -23,7 +23,7 @@ _BODY_NUMBERS = {"loose": "01234", "pairs": "00122", "bonded": "00000"}
 
 
 @dataclass(frozen=True, slots=True)
-class SheetLayer:
+class _SheetLayer:
     """One layer of the sheet.
 
     Attributes:
@@ -71,7 +71,7 @@ class LayerStack:
         GeometryError: not five layers, or an unknown assembly.
     """
 
-    layers: tuple[SheetLayer, SheetLayer, SheetLayer, SheetLayer, SheetLayer]
+    layers: tuple[_SheetLayer, _SheetLayer, _SheetLayer, _SheetLayer, _SheetLayer]
     assembly: AssemblyMode = "loose"
 
     def __post_init__(self) -> None:
@@ -162,10 +162,10 @@ def snap_to_cylinder(frustum: Frustum, tolerance: float) -> Frustum:
 #: materials of the paper's section 4.1, with common thicknesses and moduli of the right order of magnitude
 PAPER_STACK = LayerStack(
     (
-        SheetLayer("lower substrate", "silicone foam sheet", 2.5e-3, stiffness=0.3e6),
-        SheetLayer("lower conductive", "graphite paper", 0.1e-3, stiffness=1e9),
-        SheetLayer("isolation", "polyethylene mesh", 0.8e-3, stiffness=20e6),
-        SheetLayer("upper conductive", "graphite paper", 0.1e-3, stiffness=1e9),
-        SheetLayer("upper substrate", "silicone foam sheet", 2.5e-3, stiffness=0.3e6),
+        _SheetLayer("lower substrate", "silicone foam sheet", 2.5e-3, stiffness=0.3e6),
+        _SheetLayer("lower conductive", "graphite paper", 0.1e-3, stiffness=1e9),
+        _SheetLayer("isolation", "polyethylene mesh", 0.8e-3, stiffness=20e6),
+        _SheetLayer("upper conductive", "graphite paper", 0.1e-3, stiffness=1e9),
+        _SheetLayer("upper substrate", "silicone foam sheet", 2.5e-3, stiffness=0.3e6),
     )
 )

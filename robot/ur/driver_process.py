@@ -136,7 +136,7 @@ _START_TIMEOUT = 3.0  # s for the controller to start the control program again
 _MOVE_POLL_PERIOD = 0.005  # s between two looks at a move whose end the program waits for
 
 
-class DriverProcess:
+class _DriverProcess:
     """Server of both channels; one step at a time, so that it can be tested with a mocked arm.
 
     Args:
@@ -339,7 +339,7 @@ def main(arguments: list[str]) -> int:
         return 1
     try:
         with Deadman(guard, program) as deadman, UrArm(settings["host"], settings["watchdog_hz"]) as arm:
-            driver = DriverProcess(
+            driver = _DriverProcess(
                 arm,
                 guard,
                 program,

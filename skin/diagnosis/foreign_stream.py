@@ -132,7 +132,7 @@ def _swap_words(data: bytes) -> bytes:
     return words.tobytes()
 
 
-def undo_slip(data: bytes) -> bytes:
+def _undo_slip(data: bytes) -> bytes:
     """Return the bytes as they were before they were wrapped in SLIP (RFC 1055)."""
     return data.replace(b"\xc0", b"").replace(b"\xdb\xdc", b"\xc0").replace(b"\xdb\xdd", b"\xdb")
 
@@ -255,7 +255,7 @@ _BYTE_CODINGS: tuple[tuple[Cause, str, Callable[[bytes], bytes]], ...] = (
     (Cause.INVERTED, "every bit inverted, and reversed", lambda data: data.translate(_REVERSED_BITS[::-1])),
     (Cause.NIBBLES_SWAPPED, "the halves of each byte exchanged", lambda data: data.translate(_SWAPPED_NIBBLES)),
     (Cause.WORDS_SWAPPED, "the two bytes of each word exchanged", _swap_words),
-    (Cause.SLIP, "SLIP around them", undo_slip),
+    (Cause.SLIP, "SLIP around them", _undo_slip),
     (Cause.COBS, "COBS as their coding", _undo_cobs),
 )
 _TEXT_CODINGS: tuple[tuple[Cause, str, Callable[[bytes], bytes]], ...] = (

@@ -14,7 +14,7 @@ from coneskin.skin.wire import FRAME_LENGTHS, MAX_LENGTH, SYNC, VERSION
 from .capture import FoundFrames, count_frames, printable_share, short_hex, sync_places
 from .cause import Cause
 from .foreign_checksum import find_checksum
-from .foreign_stream import first_line, undo_slip
+from .foreign_stream import _undo_slip, first_line
 
 _MIN_STARTS = 4  # that look like a frame's beginning
 _AGREEING_SHARE = 0.6  # of them that must agree
@@ -134,7 +134,7 @@ def find_damage(data: bytes, found: FoundFrames) -> Finding | None:
     share = f"{100.0 * (1.0 - found.covered):.1f} % of the bytes are no frames"
     for cause, words, undo in (
         (Cause.NEWLINES, "each 0A in a frame has become 0D 0A", lambda data: data.replace(b"\r\n", b"\n")),
-        (Cause.SLIP, "the frames are wrapped in SLIP", undo_slip),
+        (Cause.SLIP, "the frames are wrapped in SLIP", _undo_slip),
     ):
         frames, covered = count_frames(undo(data))
         if frames > len(found.frames) and covered > found.covered + 0.5 * (1.0 - found.covered):

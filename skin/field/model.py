@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,7 @@ from coneskin.core.errors import FieldError
 from .disc import Disc, Discs, check_discs
 from .fourport import Coupling, DrivePhase, Readings, admittance, solve_phase
 from .multipole import LADDER, higher, resolution, solve_discs
-from .one_scene import SceneSolver, scene_solver
+from .one_scene import SceneSolver
 from .sheet import SectorSheet
 
 #: Pairs of points in one piece of a batch, measured: larger pieces leave the cache.
@@ -28,6 +29,8 @@ PAIRS_AT_ONCE = 12000
 
 #: Error that rounding leaves, relative to the supply: no tolerance below asks for more multipoles.
 _ROUNDING_ERROR = 1e-13
+
+_shared_solver = lru_cache(maxsize=64)(SceneSolver)  # one for equal sheets
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ class FieldModel:
         if not 1e-15 <= self.tolerance <= 0.1:
             raise FieldError(f"tolerance must be in [1e-15, 0.1] of the supply, got {self.tolerance!r}")
         given = self.sheet, self.upper_resistance, self.lower_resistance, self.tolerance
-        object.__setattr__(self, "_scenes", scene_solver(*given))
+        object.__setattr__(self, "_scenes", _shared_solver(*given))
         length, breadth = self.sheet.length, self.sheet.breadth
         bare = breadth / (self.upper_resistance * length), length / (self.lower_resistance * breadth)
         object.__setattr__(self, "_bare", bare)

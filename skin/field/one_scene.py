@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -404,12 +404,6 @@ def _solution_change(one: tuple[float, ...], other: tuple[float, ...], units: tu
     along, diagonal, around = units
     tensor = max(abs(xx - xx2) * along, abs(xy - xy2) * diagonal, abs(yy - yy2) * around)
     return max(relative, abs(x - x2), abs(y - y2), tensor)
-
-
-@lru_cache(maxsize=64)
-def scene_solver(sheet: SectorSheet, upper_resistance: float, lower_resistance: float, tolerance: float) -> SceneSolver:
-    """Return the solver of scenes on these sheets; equal ones share it. Arguments as of `FieldModel`."""
-    return SceneSolver(sheet, upper_resistance, lower_resistance, tolerance)
 
 
 def _rates(strength: float, answer: float, room: float) -> list[tuple[float, float]]:

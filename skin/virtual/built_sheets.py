@@ -36,7 +36,7 @@ _CACHE_SIZE = 128  # places whose matrices are kept
 
 
 @dataclass(frozen=True, slots=True)
-class SheetFlaws:
+class _SheetFlaws:
     """What is not ideal about one sheet. x runs from its first electrode (B, D) to its second (A, C), 0 to 1.
 
     Raises:
@@ -79,13 +79,13 @@ class SheetFlaws:
         return np.maximum(value, 0.05)
 
 
-def draw_flaws(tolerance: SheetTolerance, seed: int) -> tuple[SheetFlaws, SheetFlaws]:
+def _draw_flaws(tolerance: SheetTolerance, seed: int) -> tuple[_SheetFlaws, _SheetFlaws]:
     """Return an upper and a lower sheet, drawn from what a class of sheets is like."""
     rng = random.Random(f"sheets {seed}")
 
-    def one() -> SheetFlaws:
+    def one() -> _SheetFlaws:
         slope, across = rng.gauss(0.0, tolerance.slope), rng.gauss(0.0, tolerance.slope)
-        return SheetFlaws(
+        return _SheetFlaws(
             *(slope, across, tolerance.patches),
             *(rng.gauss(0.0, tolerance.skew), rng.gauss(0.0, tolerance.skew)),
             lines=(abs(rng.gauss(0.0, tolerance.line)), abs(rng.gauss(0.0, tolerance.line))),
@@ -95,10 +95,10 @@ def draw_flaws(tolerance: SheetTolerance, seed: int) -> tuple[SheetFlaws, SheetF
     return one(), one()
 
 
-class BuiltSheet:
+class _BuiltSheet:
     """One sheet with its two electrodes, x along its field; its size is from electrode to electrode, and across [m]."""
 
-    def __init__(self, flaws: SheetFlaws, size: tuple[float, float], ohms: float) -> None:
+    def __init__(self, flaws: _SheetFlaws, size: tuple[float, float], ohms: float) -> None:
         from scipy.sparse import coo_matrix
         from scipy.sparse.linalg import splu
 
@@ -174,14 +174,14 @@ def _shares(x: float, y: float) -> tuple[Any, Any]:
 class _Pair:
     """The two sheets of one sensor, and their answers at the places that were asked for."""
 
-    def __init__(self, sensor: Sensor, flaws: tuple[SheetFlaws, SheetFlaws]) -> None:
+    def __init__(self, sensor: Sensor, flaws: tuple[_SheetFlaws, _SheetFlaws]) -> None:
         cone = sensor.frustum
         self.curvature = cone.sin_half_angle / cone.radius1
         self.length = math.log1p(self.curvature * cone.slant) / self.curvature if self.curvature else cone.slant
         self.breadth = cone.radius1 * cone.wrap
         self._wrap = cone.wrap
-        self._upper = BuiltSheet(flaws[0], (self.length, self.breadth), sensor.upper_sheet_ohms)
-        self._lower = BuiltSheet(flaws[1], (self.breadth, self.length), sensor.lower_sheet_ohms)
+        self._upper = _BuiltSheet(flaws[0], (self.length, self.breadth), sensor.upper_sheet_ohms)
+        self._lower = _BuiltSheet(flaws[1], (self.breadth, self.length), sensor.lower_sheet_ohms)
         self.bare: Floats = np.zeros((4, 4))
         self.bare[np.ix_((1, 0), (1, 0))] = self._upper.own
         self.bare[np.ix_((3, 2), (3, 2))] = self._lower.own
@@ -218,10 +218,10 @@ class _Pair:
         return between, force
 
 
-class BuiltSheets:
+class _BuiltSheets:
     """Contact model of an upper and a lower sheet as they are built, beside the exact one of ideal sheets."""
 
-    def __init__(self, flaws: tuple[SheetFlaws, SheetFlaws], exact: ContactModel) -> None:
+    def __init__(self, flaws: tuple[_SheetFlaws, _SheetFlaws], exact: ContactModel) -> None:
         self._exact = exact
         self._pairs = lru_cache(maxsize=16)(lambda sensor: (_Pair(sensor, flaws), _Pair(sensor, _IDEAL_FLAWS)))
 
@@ -241,7 +241,7 @@ class BuiltSheets:
             pair.admittance([contact])
 
 
-_IDEAL_FLAWS = SheetFlaws(), SheetFlaws()
+_IDEAL_FLAWS = _SheetFlaws(), _SheetFlaws()
 
 
 def build_specimen(
@@ -262,5 +262,5 @@ def build_specimen(
         parts = sensor.electronics
         leads = LeadOhms(*(ohms + abs(rng.gauss(0.0, tolerance.lead)) for ohms in parts.lead_ohms))
         built.append(replace(sensor, electronics=replace(parts, lead_ohms=leads)))
-    upper, lower = draw_flaws(tolerance, seed)
-    return built, BuiltSheets((replace(upper, peeled=peeled), lower), contact_model(model))
+    upper, lower = _draw_flaws(tolerance, seed)
+    return built, _BuiltSheets((replace(upper, peeled=peeled), lower), contact_model(model))

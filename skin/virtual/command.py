@@ -94,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "D, current, supply or touch, whose readings gain (0 to 10) multiplies; saturate_count 0 to 65535; "
         "clock_jump_us microseconds; status a number, whose bits are in docs/look-up/wire-format.md (1: supply)"
     )
-    add("--fault", type=_argument(parse_fault), metavar="NAME=VALUE", help=help_text, **many)
+    add("--fault", type=_argument(_parse_fault), metavar="NAME=VALUE", help=help_text, **many)
     help_text = "the sheets: exact field, or ideal resistors (default field)"
     add("--model", choices=MODELS, default="field", help=help_text)
     help_text = (
@@ -345,7 +345,7 @@ def _parse_way(text: str) -> tuple[float, float]:
     return float(first), float(last if separator else first)
 
 
-def parse_fault(text: str) -> tuple[str, float | str | WiringFaults]:
+def _parse_fault(text: str) -> tuple[str, float | str | WiringFaults]:
     """Read NAME=VALUE of one fault.
 
     Raises:

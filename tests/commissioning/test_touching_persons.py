@@ -13,7 +13,7 @@ import pytest
 
 from coneskin.commissioning import skin_watch
 from coneskin.commissioning.acceptance.commission import prepare
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.calibration.touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence
 from coneskin.commissioning.examination.guided_touches import examine_touches, guided_touches
 from coneskin.commissioning.examination.wires import examine_wires
@@ -154,10 +154,10 @@ def carry_out(machine: str, who: str, patch: pytest.MonkeyPatch) -> dict[str, An
         judge: Any = prepare(SCENE, None)
         sensors, hold = judge.sensors, 1.0
     elif machine == "calibration":
-        sensors = [SensorTouches(one, calibration_marks(one, 4 + 5 * (one is ONE))) for one in (ONE, TWO)]
+        sensors = [SensorTouches(one, _calibration_marks(one, 4 + 5 * (one is ONE))) for one in (ONE, TWO)]
         judge, hold = TouchSequence(sensors, 0.3e-3), 1.6
     else:
-        sensors = [SensorPresses(one, calibration_marks(one, 4)[:2]) for one in (ONE, TWO)]
+        sensors = [SensorPresses(one, _calibration_marks(one, 4)[:2]) for one in (ONE, TWO)]
         judge, hold = ForceSequence(sensors, (8.0, 2.0)), 3.0
     person = Person(line, PERSONS[who], hold)
     said: list[Any] = []

@@ -7,7 +7,7 @@ import pytest
 
 from coneskin.robot.guard.signals.journal import EventName
 from coneskin.runs.replay.run import read_run
-from coneskin.runs.what_if.what_if import _true_touches, judge_run
+from coneskin.runs.what_if.what_if import _judge_run, _true_touches
 from coneskin.scene.reader import parse_scene
 from coneskin.session.session import guard
 
@@ -51,6 +51,6 @@ def test_the_script_and_the_programs_touches_are_recorded_as_they_were(tmp_path:
     assert [one.sensor for one in touches] == ["skin", "skin"]
     assert [one.end - one.start for one in touches] == pytest.approx([0.5, 0.5])
     assert touches[1].start == pytest.approx(began - run.start)
-    (row,) = judge_run(tmp_path / "run.rec")
+    (row,) = _judge_run(tmp_path / "run.rec")
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 2, 0, 0)
     assert row["delay_median_ms"] > 0.0

@@ -71,7 +71,7 @@ _SAME_SHARE = 0.9  # share of the points of a region on a known side: it is no o
 _REFINED_REGIONS = 3  # regions of which the best is looked for on fine profiles
 
 
-def with_developables(
+def _with_developables(
     link: SampledLink, cones: LinkFit, options: FitOptions, say: Callable[[str], None] = lambda _: None
 ) -> LinkFit:
     """Find general cylinders and cones where they cover more of a link than the cones that were found on it.
@@ -366,4 +366,4 @@ def find_sheets(
     say = progress or (lambda _: None)
     link = sample_link(mesh, options, say)
     cones = fit_cones(link, options, say)
-    return cones if round_only else with_developables(link, cones, options, say)
+    return cones if round_only else _with_developables(link, cones, options, say)

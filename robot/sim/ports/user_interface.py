@@ -61,7 +61,7 @@ _PROGRAM_ROOTS = ("/ursim/programs/", "/programs/")
 _MAX_PROGRAM_SIZE = 4 * MAX_LENGTH  # bytes of a file
 
 
-class ProgramFolder:
+class _ProgramFolder:
     """Folder with the programs that the dashboard can load; sub-folders count, and nothing outside it does.
 
     Args:
@@ -204,7 +204,7 @@ class UserInterface:
     ) -> None:
         options = controller.options
         self.controller = controller
-        self.folder = ProgramFolder(options.programs)
+        self.folder = _ProgramFolder(options.programs)
         self.loaded = _ProgramFile("play.script", "play.script", options.program) if options.program else None
         self.operational_mode = NO_MODE
         self.user_role = "PROGRAMMER"

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.calibration.fit import CalibrationFit, KnownTouch, fit_map
 from coneskin.commissioning.misreadings import WRONG, Place, misread
 from coneskin.core.errors import SkinError
@@ -33,7 +33,7 @@ def touched(
     rng = random.Random(seed)
     cone = sensor.frustum
     found = []
-    marks = calibration_marks(sensor, count)
+    marks = _calibration_marks(sensor, count)
     assert len(marks) == count
     for mark in marks:
         true = Place(mark.u + rng.gauss(0.0, sigma), mark.phi + rng.gauss(0.0, sigma) / cone.radius_at(mark.u))

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.calibration.touches import ForceSequence, SensorPresses, _KnownPress, fit_forces
 from coneskin.commissioning.touching import Touching
 from coneskin.core.errors import SceneError, SensorError, SkinError
@@ -97,7 +97,7 @@ def test_an_event_has_the_force_with_its_deviation() -> None:
 
 def test_each_mark_is_pressed_with_each_force_until_the_level_rests() -> None:
     sensor = parse_scene(forearm_scene()).sensors[0].sensor
-    item = SensorPresses(sensor, calibration_marks(sensor)[:2])
+    item = SensorPresses(sensor, _calibration_marks(sensor)[:2])
     sequence, now, said = ForceSequence([item], (5.0, 1.0)), 0.0, []
     touching, pressed = Touching(sequence), 0.0
     while not sequence.over and now < 60.0:

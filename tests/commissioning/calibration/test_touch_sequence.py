@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from coneskin.commissioning.calibration.calibrate import calibration_marks
+from coneskin.commissioning.calibration.calibrate import _calibration_marks
 from coneskin.commissioning.calibration.touches import SensorTouches, TouchSequence
 from coneskin.commissioning.misreadings import Place
 from coneskin.commissioning.touching import Notice, Touching
@@ -23,7 +23,7 @@ class Person:
     """A person who touches what is asked for; the skin reads it in some way, with noise."""
 
     def __init__(self, sensors: list[Sensor], count: int, reads: Callable[[int, Place], Place]) -> None:
-        self.sequence = TouchSequence([SensorTouches(one, calibration_marks(one, count)) for one in sensors], 0.3e-3)
+        self.sequence = TouchSequence([SensorTouches(one, _calibration_marks(one, count)) for one in sensors], 0.3e-3)
         self.touching = Touching(self.sequence)
         self.reads, self.rng = reads, random.Random(1)
         self.now, self.touches = 100.0, 0
@@ -74,7 +74,7 @@ def test_each_mark_of_each_sensor_is_touched_once() -> None:
 
 
 def test_the_words_of_a_mark_hold_on_any_layer() -> None:
-    first, *_, last = calibration_marks(TWO, 9)
+    first, *_, last = _calibration_marks(TWO, 9)
     assert first.where.startswith(
         "10.0 mm from electrode B (end 1) along the side, which is 10 % of the way to A, and 10 %"
     )

@@ -10,7 +10,7 @@ from coneskin.core.errors import GeometryError
 from coneskin.geometry.drawing.layer_stack import (
     PAPER_STACK,
     LayerStack,
-    SheetLayer,
+    _SheetLayer,
     snap_to_cylinder,
 )
 from coneskin.geometry.frustum import Frustum, unroll
@@ -26,7 +26,7 @@ def stack(
     assembly="loose", factors=(0.5,) * 5, stiffness=(1.0,) * 5, thickness=(2.5e-3, 0.1e-3, 0.8e-3, 0.1e-3, 2.5e-3)
 ):
     rows = zip(thickness, factors, stiffness, strict=True)
-    return LayerStack(tuple(SheetLayer(f"layer {i}", "stuff", t, k, e) for i, (t, k, e) in enumerate(rows)), assembly)
+    return LayerStack(tuple(_SheetLayer(f"layer {i}", "stuff", t, k, e) for i, (t, k, e) in enumerate(rows)), assembly)
 
 
 def test_published_gaps_of_a_50_mm_link():
@@ -135,11 +135,11 @@ def test_real_tubes_snap_or_keep_their_cone():
 
 def test_mistakes_are_said():
     with pytest.raises(GeometryError, match=r"thickness of felt must be above 0 and at most 20 mm, got 0 mm"):
-        SheetLayer("felt", "felt", 0.0)
+        _SheetLayer("felt", "felt", 0.0)
     with pytest.raises(GeometryError, match=r"neutral factor of felt must be in \[0, 1\], got 1.5"):
-        SheetLayer("felt", "felt", 1e-3, 1.5)
+        _SheetLayer("felt", "felt", 1e-3, 1.5)
     with pytest.raises(GeometryError, match="stiffness of felt must be finite and above 0 Pa, got nan Pa"):
-        SheetLayer("felt", "felt", 1e-3, stiffness=math.nan)
+        _SheetLayer("felt", "felt", 1e-3, stiffness=math.nan)
     with pytest.raises(GeometryError, match="a stack has five layers"):
         LayerStack(PAPER_STACK.layers[:4])
     with pytest.raises(GeometryError, match="assembly must be one of loose, pairs, bonded, got 'glued'"):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from coneskin.impact.permissible_speed.limits_file import ForceLimits
-from coneskin.impact.permissible_speed.speed_map import speed_within_spread
+from coneskin.impact.permissible_speed.speed_map import _speed_within_spread
 from coneskin.impact.permissible_speed.taylor_integrator import integrate
 from coneskin.impact.permissible_speed.two_mass_contact import DrivenArm, StruckBody, TwoMassContact
 from coneskin.skin.materials import Padding
@@ -46,7 +46,7 @@ def test_the_worst_foam_is_the_softest_pressed_as_the_stiffest() -> None:
     wall, depth = StruckBody(math.inf), 3e-3 + 1e-3 * (50.0 - 36.0) / 34.0  # where 1.2 times the table has 60 N
 
     def found(arm: Callable[[float], DrivenArm], limits: ForceLimits) -> float:
-        return speed_within_spread(lambda v, foam: [TwoMassContact(arm(v), wall, foam)], padding, limits)
+        return _speed_within_spread(lambda v, foam: [TwoMassContact(arm(v), wall, foam)], padding, limits)
 
     free = found(lambda v: DrivenArm(v, 5.0), ForceLimits(60.0, math.inf))
     assert free == pytest.approx(math.sqrt(2.0 * 0.8 * stored_energy(padding, depth) / 5.0), rel=5e-3)
@@ -61,7 +61,7 @@ def test_no_foam_within_its_spread_presses_more_than_the_limits(kind: str) -> No
     chance = random.Random(kind)
     for _ in range(6):
         foam, region, at = random_case(chance)
-        speed = speed_within_spread(lambda v, padding, at=at: [at(v, padding)], foam, region.limits)  # type: ignore[misc]
+        speed = _speed_within_spread(lambda v, padding, at=at: [at(v, padding)], foam, region.limits)  # type: ignore[misc]
         contact = at(speed, foam)
         deepest = judge(contact, off(foam, "softer", chance, 1.0), foam.loss)[2]
         peak, lasting, _ = judge(contact, off(foam, kind, chance, deepest), foam.loss)

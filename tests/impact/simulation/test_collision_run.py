@@ -11,7 +11,7 @@ from coneskin.core.recording.block import Block
 from coneskin.core.recording.recorder import Recorder
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, body_places, contact_force
 from coneskin.runs.replay.run import read_run
-from coneskin.runs.what_if.what_if import judge_run
+from coneskin.runs.what_if.what_if import _judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import BodyScene, Scene
 from tests.support.scenes import commissioned, forearm_scene
@@ -63,7 +63,7 @@ def test_the_force_of_a_contact_stops_the_arm_through_skin_bytes_and_guard_and_t
     recorded = read_run(path)
     assert [event.name for event in recorded.events] == [event.name for event in run.events]
     assert recorded.replay().same
-    (row,) = judge_run(path)
+    (row,) = _judge_run(path)
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
     assert 0.0 < row["delay_median_ms"] <= 3.0
     (pressed, force, (place,)) = [

@@ -22,7 +22,7 @@ from coneskin.core.channel import Channel, pair, wait_readable
 from coneskin.core.errors import Collision, ConeSkinError, MissingExtra, RobotRefused
 from coneskin.robot.guard.signals.journal import BlockKind, EventName, GuardEvent, body_places, contact_force
 from coneskin.runs.replay.run import read_run
-from coneskin.runs.what_if.what_if import judge_run
+from coneskin.runs.what_if.what_if import _judge_run
 from coneskin.scene.reader import parse_scene
 from coneskin.scene.values.scene import Scene
 from coneskin.session.session import guard
@@ -148,7 +148,7 @@ def judge_the_stop(live: Live, recording: Path, events: list[GuardEvent], rest: 
     assert located.details["u"] == pytest.approx(0.13, abs=0.01)
     run = read_run(recording)
     assert run.replay().same
-    (row,) = judge_run(recording)
+    (row,) = _judge_run(recording)
     assert (row["truth"], row["touches"], row["missed"], row["false_alarms"]) == ("virtual skin", 1, 0, 0)
     truths = list(run.select(kinds=frozenset({BlockKind.TRUTH})))
     felt = [(block.time, force) for block in truths if (force := contact_force(block.payload)) is not None]

@@ -3,7 +3,7 @@
 import pytest
 
 from coneskin.core.channel import Channel, pair
-from coneskin.robot.ur.driver_process import DriverProcess
+from coneskin.robot.ur.driver_process import _DriverProcess
 
 from .fake_wheel import arm
 
@@ -18,7 +18,7 @@ def now():
 def driver(now):
     made = arm()
     (guard, guard_end), (program, program_end) = ((Channel(s) for s in pair()) for _ in range(2))
-    served = DriverProcess(made, guard_end, program_end, lambda: now[0])
+    served = _DriverProcess(made, guard_end, program_end, lambda: now[0])
     yield served, made, guard, program
     for channel in (guard, guard_end, program, program_end):
         channel.close()

@@ -16,7 +16,7 @@ from coneskin.core.errors import RecordingError
 from coneskin.runs.comparison import comparison_lines
 from coneskin.runs.replay.run import Run
 from coneskin.runs.what_if.variants import score_variants, variant_lines, write_rows
-from coneskin.runs.what_if.what_if import judge_run, judge_runs, what_if
+from coneskin.runs.what_if.what_if import _judge_run, judge_runs, what_if
 
 from ..conftest import COLLISION
 
@@ -76,10 +76,10 @@ def test_a_table_over_runs_and_variants(runs: list[Path], tmp_path: Path) -> Non
 
 
 def killed_by_broken(path: Path, variants: Sequence[Mapping[str, Any]], *_: object) -> list[dict[str, Any]]:
-    """As ``judge_run``, but a broken run kills its process, as the kernel does when memory runs out."""
+    """As ``_judge_run``, but a broken run kills its process, as the kernel does when memory runs out."""
     if path.stem == "broken":
         os.kill(os.getpid(), signal.SIGKILL)
-    return judge_run(path, variants)
+    return _judge_run(path, variants)
 
 
 @pytest.mark.long

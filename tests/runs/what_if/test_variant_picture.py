@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from coneskin.runs.what_if.variants import VariantScore, _shared_settings, draw_variants, score_variants, variant_lines
+from coneskin.runs.what_if.variants import _shared_settings, _VariantScore, draw_variants, score_variants, variant_lines
 
 
 def test_each_variant_is_a_point_with_its_name(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     scores = [
-        VariantScore("level=0.06", 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0),
-        VariantScore("level=$0.2$", 9, 0, 1, 20, 4, 0, 0, 8.0, 20.0, 1.0),
-        VariantScore("level=0.9", 9, 0, 1, 20, 20, 0, 0, math.nan, math.nan, 1.0),
-        VariantScore("level=-1", 0, 9, 0, 0, 0, 0, 0, math.nan, math.nan, 0.0),
+        _VariantScore("level=0.06", 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0),
+        _VariantScore("level=$0.2$", 9, 0, 1, 20, 4, 0, 0, 8.0, 20.0, 1.0),
+        _VariantScore("level=0.9", 9, 0, 1, 20, 20, 0, 0, math.nan, math.nan, 1.0),
+        _VariantScore("level=-1", 0, 9, 0, 0, 0, 0, 0, math.nan, math.nan, 0.0),
     ]
     path = tmp_path / "delay.svg"
     from matplotlib import rc_context
@@ -38,7 +38,7 @@ def test_variants_at_one_point_do_not_lie_on_each_other(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     from matplotlib import rc_context
 
-    same = [VariantScore(f"level={level}", 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0) for level in (0.06, 0.08)]
+    same = [_VariantScore(f"level={level}", 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0) for level in (0.06, 0.08)]
     with rc_context({"svg.fonttype": "none"}):
         draw_variants(same, tmp_path / "dot.svg")
         draw_variants([*same, same[0]._replace(false_alarms=9)], tmp_path / "delay.svg")
@@ -55,7 +55,7 @@ def test_what_all_variants_share_is_said_once() -> None:
     assert _shared_settings(names) == (["a.b=1"], ["c.d=2", "c.d=3", "without more"])
     assert _shared_settings(names[:1]) == ([], names[:1])
     assert _shared_settings([]) == ([], [])
-    lines = variant_lines([VariantScore(name, 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0) for name in names])
+    lines = variant_lines([_VariantScore(name, 9, 0, 1, 20, 0, 3, 0, 2.0, 4.0, 1.0) for name in names])
     assert lines[0] == "all with a.b=1"
     assert [line.split("  ")[0] for line in lines[2:]] == ["c.d=2", "c.d=3", "without more"]
 

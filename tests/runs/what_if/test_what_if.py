@@ -19,12 +19,12 @@ from coneskin.runs.decisions import Decisions
 from coneskin.runs.replay.run import Run, read_run
 from coneskin.runs.what_if.what_if import (
     _judge,
+    _judge_run,
     _read_labels,
     _recorded_labels,
     _score_detection,
     _TouchLabel,
     _true_touches,
-    judge_run,
 )
 
 SKIN = "forearm skin"
@@ -96,7 +96,7 @@ def test_words_about_touches_that_are_nested_without_end_are_refused(collision: 
 
 
 def judged(path: Path, run: Run, touches: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    (row,) = judge_run(write(path, told(run, {"touches": list(touches)})))
+    (row,) = _judge_run(write(path, told(run, {"touches": list(touches)})))
     return row
 
 
@@ -117,7 +117,7 @@ def test_a_cut_keeps_what_touched_the_skin_in_its_time(collision: Run, tmp_path:
     found = _true_touches(read_run(cut.path))
     assert found is not None
     assert len(found) == 2
-    (row,) = judge_run(cut.path)
+    (row,) = _judge_run(cut.path)
     assert (row["touches"], row["missed"], row["false_alarms"]) == (1, 0, 0)
 
 

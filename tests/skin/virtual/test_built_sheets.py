@@ -14,14 +14,14 @@ from coneskin.core.errors import SensorError
 from coneskin.geometry.frustum import Frustum
 from coneskin.skin.sensor import Sensor
 from coneskin.skin.tolerance import COATED_SHEETS, FILM_SHEETS, PlaceFloor, SheetTolerance
-from coneskin.skin.virtual.built_sheets import BuiltSheet, BuiltSheets, SheetFlaws, build_specimen, draw_flaws
+from coneskin.skin.virtual.built_sheets import _BuiltSheet, _BuiltSheets, _draw_flaws, _SheetFlaws, build_specimen
 from coneskin.skin.virtual.circuit import LayerContact
 from coneskin.skin.virtual.field_contacts import FieldContacts
 from coneskin.skin.wire import FrameDecoder
 
 SENSOR = Sensor(Frustum(0.0375, 0.0375, 0.24, math.radians(350.0)))
 CONTACT = LayerContact(0.06, 1.0, 1e-3, 0.004, 0.004)
-IDEAL = SheetFlaws()
+IDEAL = _SheetFlaws()
 
 
 def centre(matrix) -> tuple[float, float]:
@@ -32,14 +32,14 @@ def centre(matrix) -> tuple[float, float]:
 
 def test_ideal_sheets_are_the_exact_field() -> None:
     exact = np.array(FieldContacts().admittances(SENSOR, [[CONTACT]])[0])
-    built = np.array(BuiltSheets((IDEAL, IDEAL), FieldContacts()).admittances(SENSOR, [[CONTACT]])[0])
+    built = np.array(_BuiltSheets((IDEAL, IDEAL), FieldContacts()).admittances(SENSOR, [[CONTACT]])[0])
     assert built == pytest.approx(exact, abs=1e-15)
 
 
 def test_a_slope_moves_the_potential_by_its_integral() -> None:
     """f(x) = x + s (x^2 - x)/2 of a resistance 1 + s (x - 1/2)."""
-    flaws = (SheetFlaws(slope=0.1), IDEAL)
-    (matrix,) = BuiltSheets(flaws, FieldContacts()).admittances(SENSOR, [[CONTACT]])
+    flaws = (_SheetFlaws(slope=0.1), IDEAL)
+    (matrix,) = _BuiltSheets(flaws, FieldContacts()).admittances(SENSOR, [[CONTACT]])
     (ideal,) = FieldContacts().admittances(SENSOR, [[CONTACT]])
     x = CONTACT.u / SENSOR.frustum.slant
     moved = centre(matrix)[0] - centre(ideal)[0]
@@ -49,7 +49,7 @@ def test_a_slope_moves_the_potential_by_its_integral() -> None:
 
 def test_a_line_fed_at_one_end_has_the_resistance_of_its_ladder() -> None:
     """An electrode of r ohm whose current leaves evenly is r/3 in series, to first order."""
-    bare = np.array(BuiltSheets((SheetFlaws(lines=(3.0, 0.0)), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
+    bare = np.array(_BuiltSheets((_SheetFlaws(lines=(3.0, 0.0)), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
     ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
     assert 1.0 / bare[0, 0] - 1.0 / ideal[0, 0] == pytest.approx(1.0, rel=0.02)
     currents = np.kron(np.diag([bare[0, 0], ideal[2, 2]]), [[1.0, -1.0], [-1.0, 1.0]])
@@ -58,14 +58,14 @@ def test_a_line_fed_at_one_end_has_the_resistance_of_its_ladder() -> None:
 
 
 def test_what_peels_off_narrows_the_way_of_the_current() -> None:
-    bare = np.array(BuiltSheets((SheetFlaws(peeled=0.2), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
+    bare = np.array(_BuiltSheets((_SheetFlaws(peeled=0.2), IDEAL), FieldContacts()).admittances(SENSOR, [[]])[0])
     ideal = np.array(FieldContacts().admittances(SENSOR, [[]])[0])
     assert 0.9 * ideal[0, 0] < bare[0, 0] < 0.999 * ideal[0, 0]
 
 
 def test_the_floor_holds_a_fifth_of_an_electrode_that_no_reading_shows_to_have_peeled_off() -> None:
     size, x = (0.24, 0.229), np.arange(49) / 48
-    off = size[0] * (BuiltSheet(SheetFlaws(peeled=0.2), size, 1000.0).answer[:2401, 1].reshape(49, 49) - x[:, None])
+    off = size[0] * (_BuiltSheet(_SheetFlaws(peeled=0.2), size, 1000.0).answer[:2401, 1].reshape(49, 49) - x[:, None])
     for tolerance, held in ((FILM_SHEETS, True), (replace(FILM_SHEETS, peel=0.0), False)):
         floor = PlaceFloor(tolerance, size, (1048.0, 954.0))
         variances = np.array([[floor.at(a, b, 0.0, 0.0)[0] for b in x] for a in x])
@@ -85,9 +85,9 @@ def test_the_ellipse_of_the_floor_holds_19_of_20_places_of_sheets_drawn_from_the
 
     def seen(along: tuple[float, float]) -> np.ndarray:
         """Where a sheet puts what lies on a grid, along its own side [m]."""
-        flaws = SheetFlaws(lines=tuple(abs(rng.normal(0.0, 20.0, 2))))
-        flaws = flaws if flaw == "line" else SheetFlaws(skew=rng.normal(0.0, 0.05))
-        field = BuiltSheet(flaws, along, 1000.0).answer[:2401, 1].reshape(49, 49)
+        flaws = _SheetFlaws(lines=tuple(abs(rng.normal(0.0, 20.0, 2))))
+        flaws = flaws if flaw == "line" else _SheetFlaws(skew=rng.normal(0.0, 0.05))
+        field = _BuiltSheet(flaws, along, 1000.0).answer[:2401, 1].reshape(49, 49)
         field = field[:, ::-1] if rng.random() < 0.5 and flaw == "line" else field
         return along[0] * RegularGridInterpolator((np.linspace(0.0, 1.0, 49),) * 2, field)(grid)
 
@@ -147,7 +147,7 @@ def test_the_field_of_a_sheet_is_that_of_ngsolve(slope: float, across: float, sk
     rest = (-form.mat * field.vec).Evaluate()
     field.vec.data += form.mat.Inverse(space.FreeDofs()) * rest
     energy = ngsolve.Integrate(tensor * ngsolve.grad(field) * ngsolve.grad(field), mesh)
-    own = BuiltSheet(SheetFlaws(slope, across, 0.0, skew, stretch), (length, breadth), 1000.0)
+    own = _BuiltSheet(_SheetFlaws(slope, across, 0.0, skew, stretch), (length, breadth), 1000.0)
     assert own.own[0, 0] == pytest.approx(energy, rel=1e-3)  # the bond of an electrode is 5 mohm of a kilohm
     for i, j in ((12, 12), (24, 40), (40, 6)):
         seen = own.answer[i * 49 + j, 0]
@@ -155,8 +155,8 @@ def test_the_field_of_a_sheet_is_that_of_ngsolve(slope: float, across: float, sk
 
 
 def test_a_specimen_is_drawn_by_its_seed() -> None:
-    assert draw_flaws(COATED_SHEETS, 3) == draw_flaws(COATED_SHEETS, 3)
-    assert draw_flaws(COATED_SHEETS, 3) != draw_flaws(COATED_SHEETS, 4)
+    assert _draw_flaws(COATED_SHEETS, 3) == _draw_flaws(COATED_SHEETS, 3)
+    assert _draw_flaws(COATED_SHEETS, 3) != _draw_flaws(COATED_SHEETS, 4)
     (built,), _ = build_specimen([SENSOR], SheetTolerance(lead=5.0), 1, "ladder", 0.0)
     assert all(ohms > 1.0 for ohms in built.electronics.lead_ohms)
 

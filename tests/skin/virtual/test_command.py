@@ -83,12 +83,12 @@ def test_a_touch_that_cannot_be(text):
 )
 def test_a_fault_that_cannot_be(text, words):
     with pytest.raises(SensorError, match=words):
-        command.parse_fault(text)
+        command._parse_fault(text)
 
 
 def test_every_fault_takes_a_value_of_its_kind():
     given = "gain_after=0", "gain_of=D", "gain=0.5", "status=0x08", "stuck_channel=radial_c", "wiring=short-A-rail"
-    faults = FaultInjection(**dict(map(command.parse_fault, given)))
+    faults = FaultInjection(**dict(map(command._parse_fault, given)))
     assert (faults.gain_of, faults.gain, faults.status, faults.stuck_channel) == ("D", 0.5, 8, "radial_c")
     assert faults.wiring.shorts == (("A", "rail"),)
 

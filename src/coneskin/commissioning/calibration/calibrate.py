@@ -27,7 +27,7 @@ from .fit import CalibrationFit, fit_map
 from .touches import ForceSequence, SensorPresses, SensorTouches, TouchSequence, fit_forces
 
 
-def calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
+def _calibration_marks(sensor: Sensor, count: int = 9) -> tuple[Mark, ...]:
     """Return the marks of a sensor, row by row from end 1, each row from the end of the one before.
 
     Around, the words have parts and no lengths: the face that is touched is farther out than the layers that are read.
@@ -209,4 +209,4 @@ def _marks(sensor: Sensor, count: int, file: Path | None) -> tuple[Mark, ...]:
     """Return the marks of a sensor: as many as are asked for, or those that its design has printed on it."""
     sheet = None if count or file is None else _find_design(file)
     printed = () if sheet is None else _printed_marks(sensor, sheet)
-    return printed or calibration_marks(sensor, count or 9)
+    return printed or _calibration_marks(sensor, count or 9)

@@ -83,7 +83,7 @@ def permissible_speed(
     return low
 
 
-def speed_within_spread(
+def _speed_within_spread(
     at_speed: Callable[[float, Padding], Sequence[TwoMassContact]],
     padding: Padding,
     limits: ForceLimits,
@@ -308,7 +308,7 @@ class _CurveMaker:
             least, top = _LEAST_SPEED, _TOP_SPEED
             if number and speeds[-1] > 0.0:  # a longer lever brakes sooner, but not by more than it is longer
                 least, top = speeds[-1], min(_TOP_SPEED, 1.01 * speeds[-1] * lever / LEVERS[number - 1])
-            speeds.append(speed_within_spread(contacts, self._padding, region.limits, least, top))
+            speeds.append(_speed_within_spread(contacts, self._padding, region.limits, least, top))
         for number in reversed(range(len(speeds) - 1)):  # what the search leaves of a fall is taken off
             speeds[number] = min(speeds[number], speeds[number + 1])
         return tuple(speeds)

@@ -16,7 +16,7 @@ from coneskin.core.picture_file import write_picture
 from coneskin.runs.export.tables import write_parquet
 
 
-class VariantScore(NamedTuple):
+class _VariantScore(NamedTuple):
     """Score of one variant over all runs.
 
     Attributes:
@@ -47,7 +47,7 @@ class VariantScore(NamedTuple):
     hours: float
 
 
-def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:
+def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[_VariantScore]:
     """Return the score of each variant in the rows of ``judge_runs``, in their order."""
     scores = []
     for variant in dict.fromkeys(row["variant"] for row in rows):
@@ -62,11 +62,11 @@ def score_variants(rows: Sequence[Mapping[str, Any]]) -> list[VariantScore]:
         median = statistics.median(delays) if delays else math.nan
         hours = sum(row["duration_s"] for row in good) / 3600.0
         facts = (variant, len(good), len(mine) - len(good), changed, *sums, median, max(worst, default=math.nan), hours)
-        scores.append(VariantScore._make(facts))
+        scores.append(_VariantScore._make(facts))
     return scores
 
 
-def variant_lines(scores: Sequence[VariantScore]) -> list[str]:
+def variant_lines(scores: Sequence[_VariantScore]) -> list[str]:
     """Return the table in lines."""
     shared, names = _shared_settings([score.variant for score in scores])
     width = max([7, *map(len, names)])
@@ -104,7 +104,7 @@ _LINE_HEIGHT = 0.19  # inch of a line of the key
 _MIN_DELAY_SCALE = 1.0  # ms that the scale of the delays shows at least, above the largest
 
 
-def draw_variants(scores: Sequence[VariantScore], path: Path) -> None:
+def draw_variants(scores: Sequence[_VariantScore], path: Path) -> None:
     """Draw the variants into a file, in the format of its suffix.
 
     Raises:
@@ -114,7 +114,7 @@ def draw_variants(scores: Sequence[VariantScore], path: Path) -> None:
     write_picture(path, "the picture of variants", lambda figure: _compose(figure, scores), RecordingError)
 
 
-def _compose(figure: Any, scores: Sequence[VariantScore]) -> None:
+def _compose(figure: Any, scores: Sequence[_VariantScore]) -> None:
     from matplotlib.lines import Line2D
 
     shared, names = _shared_settings([score.variant for score in scores])
@@ -154,16 +154,16 @@ def _duration_words(hours: float) -> str:
     return f"{60.0 * hours:.3g} min" if hours < 1.0 else f"{hours:.3g} h"
 
 
-def _place(score: VariantScore) -> tuple[float, float]:
+def _place(score: _VariantScore) -> tuple[float, float]:
     """Return where a variant is drawn: false alarms and unlabeled contacts, delay [ms]."""
     return score.false_alarms + score.unlabeled, score.delay_median_ms
 
 
-def _look(score: VariantScore) -> tuple[str, str]:
+def _look(score: _VariantScore) -> tuple[str, str]:
     return ("#D55E00", "x") if score.missed > 0 else ("#0072B2", "o")
 
 
-def _draw_places(axes: Any, scores: Sequence[VariantScore], time: str) -> None:
+def _draw_places(axes: Any, scores: Sequence[_VariantScore], time: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     places = {number: _place(score) for number, score in enumerate(scores, 1) if not math.isnan(score.delay_median_ms)}

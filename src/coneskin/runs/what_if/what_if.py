@@ -161,7 +161,7 @@ def what_if(
 
 
 Rows = list[dict[str, Any]]
-_Judge = Callable[..., Rows]  # as ``judge_run``
+_Judge = Callable[..., Rows]  # as ``_judge_run``
 _Variants = Sequence[Mapping[str, Any]]
 
 
@@ -170,7 +170,7 @@ def _variant_name(settings: Mapping[str, Any]) -> str:
     return ", ".join(f"{name}={value}" for name, value in settings.items()) or AS_RECORDED
 
 
-def judge_run(path: Path, variants: _Variants = ({},), progress: Progress = silent) -> Rows:
+def _judge_run(path: Path, variants: _Variants = ({},), progress: Progress = silent) -> Rows:
     """Replay a run with each variant of its settings and return a row for each; a broken run is a row with its error.
 
     The columns: run, path, variant, error, complete, same (as recorded, bit by bit but for the last), first_difference,
@@ -297,7 +297,7 @@ def judge_runs(
     jobs: int | None = None,
     scheduler: str = "",
     progress: Progress = silent,
-    judge: _Judge = judge_run,
+    judge: _Judge = _judge_run,
 ) -> Rows:
     """Judge runs, each with each variant of its settings.
 
@@ -307,7 +307,7 @@ def judge_runs(
         scheduler: address of a Dask scheduler, such as "tcp://10.0.0.5:8786", whose workers see the same paths.
 
     Returns:
-        a row for each run and variant, in the order of the runs; see ``judge_run``.
+        a row for each run and variant, in the order of the runs; see ``_judge_run``.
 
     Raises:
         RecordingError: the number of jobs is below 1, or the cluster cannot be reached.

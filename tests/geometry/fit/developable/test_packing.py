@@ -11,7 +11,7 @@ from scipy.special import ellipe
 
 from coneskin.geometry.fit.cones import LEAST_GAIN, LinkFit, fit_cones
 from coneskin.geometry.fit.developable import packing
-from coneskin.geometry.fit.developable.packing import find_sheets, with_developables
+from coneskin.geometry.fit.developable.packing import _with_developables, find_sheets
 from coneskin.geometry.fit.developable.side_fit import fit_developable
 from coneskin.geometry.fit.fit_options import FitOptions
 from coneskin.geometry.mesh import Mesh, make_mesh
@@ -33,7 +33,7 @@ def found_on(mesh: Mesh, **named: int) -> tuple[LinkFit, LinkFit]:
     """Return the cones of a mesh and its sheets, as ``find_sheets`` makes both, by one search on shared samples."""
     link, options = sampled(mesh, 6000), FitOptions(**named)
     cones = fit_cones(link, options, lambda _: None)
-    return cones, with_developables(link, cones, options)
+    return cones, _with_developables(link, cones, options)
 
 
 def side_of(section: Section, tolerance: float = 1e-3):
@@ -151,5 +151,5 @@ def test_other_sheets_take_the_place_of_cones_only_for_a_clear_gain(
     link = SimpleNamespace(
         counted=range(4), worth=None, hull=None, axes=None, mesh=None, eased=lambda asked: (asked, ())
     )
-    assert packing.with_developables(link, cones, options) is cones  # type: ignore[arg-type]
+    assert packing._with_developables(link, cones, options) is cones  # type: ignore[arg-type]
     assert ("hull_note" in refused) is taken
