@@ -190,14 +190,7 @@ class Developable(PlacedFrustum):
         return float(u[0]), float(phi[0]), float(distance[0])
 
     def rulings(self, phi: ArrayLike) -> tuple[Floats, Floats, Floats]:
-        """Return the points of end 1 [m], the directions of the rulings and the normals, in the frame of the side.
-
-        Args:
-            phi: azimuths [rad].
-
-        Returns:
-            three arrays of shape (..., 3).
-        """
+        """Return the points of end 1 [m], the rulings' directions and the normals at azimuths [rad], shape (..., 3)."""
         import numpy as np
 
         phi = np.asarray(phi, float)

@@ -113,12 +113,9 @@ def require_step_writer() -> None:
 
 
 def write_step(path: Path, layers: Sequence[WrappedLayer]) -> None:
-    """Write the layers as named solids into a STEP file (AP214), in millimetres.
+    """Write the layers, at least one, as named solids into a STEP file (AP214), in millimetres.
 
     Their faces are exact cones, cylinders and planes, so a CAD program measures radii and distances on them.
-
-    Args:
-        layers: at least one.
 
     Raises:
         GeometryError: the kernel refuses a shape, or the file cannot be written.

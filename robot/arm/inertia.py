@@ -347,10 +347,7 @@ _JOINT_TORQUES = {
 
 
 def arm_inertia(model: ArmModel | str) -> ArmInertia:
-    """Return the inertia of an arm, without any tool.
-
-    Args:
-        model: the arm, or its name as ``arm_model`` takes it.
+    """Return the inertia of an arm, or of that of a name, without any tool.
 
     Raises:
         KinematicsError: there is no such arm, or its inertia is not known.

@@ -92,13 +92,8 @@ class RegisterWriter(StateReader):
 class _InputOwner(RtdeConnection):
     """Connection that owns inputs of the controller and reads outputs that go with them; open it in a ``with``.
 
-    Args:
-        timeout: how long connecting and each reply may take [s].
-
     Raises:
-        RobotConnectionError: on entering, where the controller cannot be reached.
-        RobotRefused: on entering, where another client has taken one of the inputs.
-        RobotTimeout: on entering, where the controller does not answer.
+        RobotRefused: on entering, where another client has taken one of the inputs; all else as `RtdeConnection`.
     """
 
     _what: ClassVar[str]  # for people
@@ -196,11 +191,7 @@ _HEARTBEAT_RECIPE = rtde.Recipe(_HEARTBEAT_OUTPUTS)
 
 
 def heartbeat_lines(frequency: float) -> str:
-    """Return the lines of URScript that go to the beginning of a program.
-
-    Args:
-        frequency: the program is ended where no count comes for 1 / frequency [Hz].
-    """
+    """Return the lines with which a program begins, which is ended where no count comes for 1 / frequency [Hz]."""
     return (
         f'rtde_set_watchdog("{HEARTBEAT_INPUTS[0]}", {frequency:g}, "stop")\n'
         f"write_output_integer_register({_HEARTBEAT_REGISTER}, read_input_integer_register({_HEARTBEAT_REGISTER}))\n"

@@ -165,15 +165,7 @@ _USER_REGISTERS = (*range(18, 23), *range(42, 47))  # those that ur_rtde leaves 
 
 
 class RtdeOutputWriter:
-    """Writer of outputs; open it in a ``with``. Any thread may write.
-
-    Args:
-        timeout: how long connecting and each reply may take [s].
-
-    Raises:
-        RobotConnectionError: on entering, where the controller cannot be reached.
-        RobotTimeout: on entering, where it does not answer.
-    """
+    """Writer of outputs; open it in a ``with``, which raises as `RtdeVariableReader` says. Any thread may write."""
 
     def __init__(self, host: str, timeout: float = 2.0) -> None:
         self._host, self._timeout = host, timeout

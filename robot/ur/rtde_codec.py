@@ -324,10 +324,7 @@ _ARM_RUNNING: Final = 7  # value of robot_mode: powered, brakes released
 
 
 def decode_state(time: float, payload: bytes) -> ControllerState:
-    """Return the state in the payload of an RTDE data packet of the state reader's recipe.
-
-    Args:
-        time: host time [s].
+    """Return the state, read at a host time [s], in the payload of a data packet of the state reader's recipe.
 
     Raises:
         RobotConnectionError: the payload has another length, or its time, a position, a speed or a current is not

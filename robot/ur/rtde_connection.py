@@ -153,15 +153,7 @@ class RtdeConnection(TcpReader):
 
 
 class StateReader(RtdeConnection):
-    """Reader of the controller's state; open it in a ``with``.
-
-    Args:
-        timeout: how long connecting and each reply may take [s].
-
-    Raises:
-        RobotConnectionError: on entering, where the controller cannot be reached or refuses.
-        RobotTimeout: on entering, where it does not answer.
-    """
+    """Reader of the controller's state; open it in a ``with``, which raises as `RtdeConnection` says."""
 
     def __enter__(self) -> Self:
         super().__enter__()

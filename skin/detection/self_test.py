@@ -43,11 +43,7 @@ class FrameSelfTest:
         self._count = 0
 
     def feed(self, matrix: ContactMatrix) -> bool:
-        """Take a frame of a touch. Tell whether its guides contradict each other, and have for long.
-
-        Args:
-            matrix: of a valid frame that is touched firmly enough for a place.
-        """
+        """Take a valid frame that has a firm place. Tell whether its guides have contradicted each other for long."""
         most, drawn = _RECIPROCITY_THIRD * matrix.around, _DRAWN_THIRD * self._drawn(matrix)
         if (
             -most <= matrix.reciprocity <= most

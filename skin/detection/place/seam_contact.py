@@ -173,11 +173,7 @@ class SeamCertainty:
         self._before = None
 
     def may_be(self, values: tuple[float, float, float, float, float, float]) -> bool:
-        """Tell at little cost whether a touch may be a press over the seam.
-
-        Args:
-            values: the first six of a ``ContactMatrix``.
-        """
+        """Tell at little cost whether a touch may be a press over the seam, by the first six of a ``ContactMatrix``."""
         return not values[5] - self._lower < _MIN_SEAM_SHARE * values[0]
 
     def feed(

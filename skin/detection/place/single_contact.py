@@ -158,11 +158,7 @@ def weakest_pair_excluded(sensor: Sensor, frames: int = 100) -> float:
 
 
 def frames_until_certain(sensor: Sensor, settings: DetectorSettings) -> int | None:
-    """Return for how many frames a firm touch by one contact lasts before its place is certain. None where it never is.
-
-    Args:
-        settings: the weakest second contact that is to be excluded.
-    """
+    """Return after how many frames of a firm touch by one contact its place is certain. None where it never is."""
     one = weakest_pair_excluded(sensor, 1)  # it falls with the square root of the number of frames
     frames = max(1, math.ceil((one / settings.second_contact) ** 2))
     return frames if frames <= _PAIR_FRAMES else None
