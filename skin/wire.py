@@ -37,6 +37,9 @@ class Status(IntFlag):
     RESERVED = 0x80  #: always zero
 
 
+STATUS_FAULTS: Final = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)  #: bits that make a frame invalid
+
+
 class DrivenPotentials(NamedTuple):
     """Potentials of the driven electrodes themselves, each on a wire that carries no current [counts]."""
 

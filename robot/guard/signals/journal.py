@@ -103,6 +103,8 @@ class EventName(StrEnum):
     SKIN_LINE = "skin_line", "The guard waits for a skin, and its bytes are wrong. `what` says how."
 
 
+#: events that tell where a touch is
+CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
 INPUTS = frozenset(kind for kind in BlockKind if kind < BlockKind.EVENT or kind >= BlockKind.ECHO)
 #: events about the guard, not from it, which a replay does not make
 SESSION_EVENTS = frozenset(

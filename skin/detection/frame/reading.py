@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import Frame, Status
+from coneskin.skin.wire import STATUS_FAULTS, Frame
 
 from .contact_matrix import ContactMatrix, FrameInversion
 from .faults import Fault
@@ -34,7 +34,6 @@ class TouchReading(NamedTuple):
     velocity: tuple[float, float] = (0.0, 0.0)  #: along the side and around [m/s]
 
 
-_STATUS_FAULTS: Final = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 _LEVEL_NOISE: Final = 1.5  # counts; noise of the level in the bound on what a leak between the layers puts on a guide
 _GUIDE_SLACK: Final = 0.05  # part of the supply that a guide may stand above that bound
 _NOISE_DEVIATIONS: Final = 7.0  # standard deviations of noise that are no contradiction
@@ -71,7 +70,7 @@ def judge(sensor: Sensor, frame: Frame, noise: float = 0.0) -> tuple[float, Faul
     supply, bounds = frame[15], sensor.bounds
     low, high = bounds.supply_low, bounds.supply_high
     if not (low <= supply <= high and low <= frame[16] <= high and low <= frame[17] <= high):
-        return 0.0, Fault.DEVICE if frame.status & _STATUS_FAULTS else Fault.SUPPLY
+        return 0.0, Fault.DEVICE if frame.status & STATUS_FAULTS else Fault.SUPPLY
     level = (frame[6] + frame[7]) / (2.0 * supply)
     fault = _fault(sensor, frame, level, noise)
     if fault is None and frame[18] is not None and _loses_drive(sensor, frame):
@@ -123,7 +122,7 @@ def _fault(sensor: Sensor, frame: Frame, level: float, noise: float) -> Fault | 
     angular_a, angular_b, current2 = frame[12], frame[13], frame[14]
     supply, supply1, supply2 = frame[15], frame[16], frame[17]
     bounds, limits = sensor.bounds, sensor.thresholds
-    if frame[3] & _STATUS_FAULTS:
+    if frame[3] & STATUS_FAULTS:
         return Fault.DEVICE
     touched = level >= limits.touch_level
     lower_is_less = current2 * bounds.radial_low < current1 * bounds.angular_low  # a wire fed from elsewhere takes both

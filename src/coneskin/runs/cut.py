@@ -48,7 +48,6 @@ _REACTION_EVENTS = frozenset(
         *(EventName.ESCALATED, EventName.STOP_FAILED),
     }
 )
-_CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED})
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from coneskin.core.progress import Progress, silent
 from coneskin.core.recording.block import Block
 from coneskin.robot.driver.messages import Release, SetJointVelocity, decode_command
 from coneskin.robot.guard.signals.journal import (
+    CONTACT_EVENTS,
     INPUTS,
     SESSION_EVENTS,
     BlockKind,
@@ -96,10 +97,7 @@ def _numbers(text: str) -> tuple[float, ...]:
     return tuple(map(float, _NUMBER_PATTERN.findall(text)))
 
 
-#: what the skin alone decides
-SKIN_EVENTS = frozenset(
-    {EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED, EventName.TOUCH_ENDED}
-)
+SKIN_EVENTS = CONTACT_EVENTS | {EventName.TOUCH_ENDED}  #: what the skin alone decides
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,9 @@ import numpy as np
 from coneskin.core.arrays import Floats
 from coneskin.core.text import printable
 from coneskin.robot.guard.signals.event_text import describe
-from coneskin.robot.guard.signals.journal import EventName, GuardEvent, describe_way, stopping_contact
+from coneskin.robot.guard.signals.journal import CONTACT_EVENTS, EventName, GuardEvent, describe_way, stopping_contact
 
-from .run_course import CHANNELS, CONTACT_EVENTS, PHASE_COLOURS, PhaseWords, RunCourse, Series
+from .run_course import CHANNELS, PHASE_COLOURS, PhaseWords, RunCourse, Series
 
 NOTICE = (
     '<div id="coneskin-notice">No safety display. What is drawn may be late, old or wrong; '

@@ -21,6 +21,7 @@ from coneskin.geometry.pose import Pose, Vector
 from coneskin.robot.arm.model import Joints
 from coneskin.robot.guard.signals.event_text import describe
 from coneskin.robot.guard.signals.journal import (
+    CONTACT_EVENTS,
     BlockKind,
     EventName,
     GuardEvent,
@@ -79,7 +80,6 @@ def _phase_after(before: PhaseWords, name: str) -> PhaseWords:
 
 FADING = 4.0  #: s that the mark of a touch that is over is still seen
 _MAX_TOUCHES = 400  # touches that are remembered, in a page that stays open
-CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
 _MAX_DISTANCE = 100.0  # m; a place farther off is no place
 
 

@@ -18,7 +18,7 @@ from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.diagnosis.measurements import MEASURED, find_short
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import FRAME_LENGTH, Frame, FrameDecoder, Status
+from coneskin.skin.wire import FRAME_LENGTH, STATUS_FAULTS, Frame, FrameDecoder, Status
 
 _CHANNELS = MEASURED[:10]  # of the supplies, one
 
@@ -77,7 +77,6 @@ _LEAST_LEAK, _MIDDLE = 2e-7, 0.1  # S between the layers that is no noise; part 
 _SUPPLY_ERROR = 0.10  # of the supply
 _MAX_NOISE = 8.0  # counts of 12 bits
 _CHANGED_SHEET, _CHANGED_SHEETS = 0.01, 0.05  # part by which one sheet, and both, may differ from what is known
-_STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
 def examine_line(
@@ -185,7 +184,7 @@ def _levels(sensor: Sensor, seen: SensorStatistics) -> list[Finding]:
         if max(abs(matrix.x - 0.5), abs(matrix.y - 0.5)) < _MIDDLE:
             remedy = "nothing may touch it now; else it is damp all over: dry it, and seal its edges"
     found.append(judged(f"{name}, guides", part <= _GUIDE_NOISE, value, "untouched: at most 1 %", remedy))
-    if status := functools.reduce(operator.or_, seen.counts("status")) & _STATUS_FAULTS:
+    if status := functools.reduce(operator.or_, seen.counts("status")) & STATUS_FAULTS:
         value = f"the device reports {', '.join(bit.name or str(bit.value) for bit in Status if bit & status)}"
         found.append(Finding(f"{name}, status", "bad", value, "none", "docs/look-up/wire-format.md"))
     return found

@@ -16,11 +16,10 @@ from coneskin.skin.diagnosis.diagnose import diagnose
 from coneskin.skin.diagnosis.frame_numbers import FrameNumbers, measure_numbers
 from coneskin.skin.diagnosis.measurements import MEASURED, expected_counts
 from coneskin.skin.sensor import Sensor
-from coneskin.skin.wire import Frame, FrameDecoder, Status, encode
+from coneskin.skin.wire import STATUS_FAULTS, Frame, FrameDecoder, Status, encode
 
 _TOUCH_LEVEL = 0.10  # level; that of a sensor about which nothing else is known
 _NEWEST_SIZE = 64  # bytes that are shown where there is no frame
-_STATUS_FAULTS = int(~(Status.RESTARTED | Status.TOUCH) & 0xFF)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +159,7 @@ class LineMonitor:
 
 def _look_at(frame: Frame, level: float) -> tuple[tuple[float, float] | None, bool, str, str]:
     """Return place, certainty, words and health as far as they show without a scene."""
-    health = f"status 0x{frame.status:02X}" if frame.status & _STATUS_FAULTS else "no fault in its status"
+    health = f"status 0x{frame.status:02X}" if frame.status & STATUS_FAULTS else "no fault in its status"
     if level < _TOUCH_LEVEL or not (frame.radial_supply and frame.angular_supply):
         return None, False, "not touched", health
     along = 1.0 - 0.5 * (frame.radial_c + frame.radial_d) / frame.radial_supply

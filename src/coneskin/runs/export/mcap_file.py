@@ -22,7 +22,7 @@ from coneskin.robot.arm.kinematics import link_pose
 from coneskin.robot.arm.model import ArmModel
 from coneskin.robot.arm.workspace import skeleton
 from coneskin.robot.driver.values import ControllerState
-from coneskin.robot.guard.signals.journal import EventName, GuardEvent
+from coneskin.robot.guard.signals.journal import CONTACT_EVENTS, EventName, GuardEvent
 from coneskin.runs.decisions import recorded_commands
 from coneskin.runs.replay.run import Run
 from coneskin.scene.build import SensorOnArm
@@ -34,7 +34,6 @@ _FRAME_ID = "base"
 _ERROR_EVENTS = frozenset(
     {EventName.FAULT, EventName.STOP_FAILED, EventName.GUARD_UNRESPONSIVE, EventName.GUARD_EXITED}
 )
-_CONTACT_EVENTS = frozenset({EventName.CONTACT, EventName.CONTACT_LOCATED, EventName.CONTACT_EXTENDED})
 _WARNING_EVENTS = frozenset({EventName.CONTACT, EventName.STOPPING, EventName.ESCALATED, EventName.NOT_COMMISSIONED})
 _INFO, _WARNING, _ERROR = 2, 3, 4  # levels of foxglove.Log
 
@@ -147,7 +146,7 @@ def _drawn_contacts(
     by_name = {item.name: item for item in placed}
     for number, event in enumerate(events):
         touched = by_name.get(str(event.details.get("sensor")))
-        if event.name not in _CONTACT_EVENTS or touched is None:
+        if event.name not in CONTACT_EVENTS or touched is None:
             continue
         near = run.states(event.time - _STATE_WINDOW, event.time + _STATE_WINDOW)
         state = min(near, key=lambda one: abs(one.time - event.time), default=None)
