@@ -4,7 +4,7 @@ examples:
   coneskin design upperarm.stl -o skin                 find the cones in a mesh (STL, OBJ, DAE, PLY)
   coneskin design ur10.urdf#upper_arm_link -o skin     the same for a link of a URDF
   coneskin design arm.urdf --wires 24 -o skins         all links of a robot: the sheets that 24 wires allow
-  coneskin design arm.urdf --share-percent 90 -o skins the fewest sheets with 90 % of the area that can be touched
+  coneskin design arm.urdf --share-percent 90 -o skins      the fewest sheets with 90 % of what can be touched
   coneskin design --radius1-mm 54 --height-mm 400 -o skin                                   a cylinder
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --wrap-deg 270 -o skin    a partial wrap of a cone
   coneskin design --radius1-mm 40 --radius2-mm 70 --height-mm 150 --radius3-mm 40 --height2-mm 150 -o skin
