@@ -302,11 +302,11 @@ def _line(z: Floats, radius: Floats, spread: float) -> tuple[float, float]:
         if total <= 0.0:  # no slice is near the last line
             break
         zm, rm = float(weights @ z) / total, float(weights @ radius) / total
-        spread = float(weights @ (z - zm) ** 2)
-        if spread <= 0.0:  # only one is
+        lever = float(weights @ (z - zm) ** 2)
+        if lever <= 0.0:  # only one is
             break
         before = start, slope
-        slope = float(weights @ ((z - zm) * (radius - rm))) / spread
+        slope = float(weights @ ((z - zm) * (radius - rm))) / lever
         start = rm - slope * zm
         if abs(start - before[0]) < 1e-8 and abs(slope - before[1]) < 1e-7:
             break
