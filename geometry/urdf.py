@@ -7,7 +7,7 @@ evaluated. Expand only what you trust.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote, urlparse
@@ -103,19 +103,25 @@ def urdf_joints(
     robot = _robot(Path(path), packages, arguments)
     for joint in robot.iter("joint"):
         kind, parent, child = joint.get("type", ""), joint.find("parent"), joint.find("child")
-        if parent is None or child is None or kind not in ("revolute", "continuous", "fixed", "prismatic"):
+        if parent is None or child is None:
             continue
         title = joint.get("name", "")
         name = f"{path}: joint {title}"
+        if kind not in ("revolute", "continuous", "fixed", "prismatic"):
+            raise MeshError(f"{name}: a joint is revolute, continuous, prismatic or fixed, got {kind!r}; make it fixed")
         axis, limit = joint.find("axis"), joint.find("limit")
-        way = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"), f"{name}: axis")
+        way = _numbers("1 0 0" if axis is None or kind == "fixed" else axis.get("xyz", "1 0 0"), f"{name}: axis")
+        if not any(way):
+            raise MeshError(f"{name}: the axis of a {kind} joint must not be 0 0 0")
         lower, upper = {"continuous": (-math.pi, math.pi)}.get(kind, (0.0, 0.0))
-        if kind in ("revolute", "prismatic") and limit is not None:
+        if kind in ("revolute", "prismatic"):
+            if limit is None:
+                raise MeshError(f"{name}: a {kind} joint needs a limit with lower and upper")
             lower, upper, _ = _numbers(f"{limit.get('lower', 0)} {limit.get('upper', 0)} 0", f"{name}: limit")
             if not lower <= upper:
                 raise MeshError(f"{name}: the lower limit must not be above the upper, got {lower:g} and {upper:g}")
         limits, travel = (-math.inf, math.inf) if kind == "continuous" else (lower, upper), 0.0
-        length = math.hypot(*way) or 1.0
+        length = math.hypot(*way)
         unit = way[0] / length, way[1] / length, way[2] / length
         origin = _origin(joint, f"joint {title}", path)
         if kind == "prismatic":
@@ -136,6 +142,20 @@ def urdf_joints(
             f"{path}: joints form a tree, so none may close a ring or lead to a link again; {twice[0]!r} does"
         )
     return tuple(joints)
+
+
+def joints_inwards(link: str, joints: Sequence[UrdfJoint], kept: Container[str]) -> tuple[str, tuple[UrdfJoint, ...]]:
+    """Return the next link towards the base that is among some, and the joints between, the outermost first.
+
+    The name is empty, and there are no joints, where no link follows.
+    """
+    inwards, between = {joint.child: joint for joint in joints}, list[UrdfJoint]()
+    while link in inwards:
+        between.append(inwards[link])
+        link = between[-1].parent
+        if link in kept:
+            return link, tuple(between)
+    return "", ()
 
 
 def link_poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str, Pose]:

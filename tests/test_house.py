@@ -478,7 +478,7 @@ def test_no_file_names_a_workplace_or_an_index() -> None:
 
 #: weight of the house: lines and files of the product, public names in 1000 lines, words of pages, one-word constants.
 #: Each is at most 3 % above what was reached; whoever raises one says in that commit what could not go instead.
-BUDGET = {"lines": 71_830, "files": 387, "names": 16.0, "words": 52_020, "one-word constants": 40}
+BUDGET = {"lines": 71_820, "files": 388, "names": 16.0, "words": 52_020, "one-word constants": 40}
 
 
 def test_the_house_keeps_its_weight() -> None:

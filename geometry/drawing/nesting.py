@@ -49,6 +49,16 @@ class _Piece:
     size: tuple[int, int]
 
 
+def require_nesting() -> None:
+    """Refuse to go on without the package that nests parts.
+
+    Raises:
+        MissingExtra: rectangle-packer is not installed.
+    """
+    with needed_package("rectangle-packer", "nesting parts on a bed", "design"):
+        import rpack  # noqa: F401
+
+
 def nest_on_beds(
     sheets: Sequence[CutSheet], width: float, depth: float, gap: float = 3e-3
 ) -> tuple[tuple[MaterialBed, ...], tuple[str, ...]]:
@@ -67,8 +77,9 @@ def nest_on_beds(
         GeometryError: the bed or the gap is out of range.
         MissingExtra: rectangle-packer is not installed.
     """
-    with needed_package("rectangle-packer", "nesting parts on a bed", "design"):
-        import rpack
+    require_nesting()
+    import rpack
+
     if not (_MIN_BED_SIDE <= width <= _MAX_BED_SIDE and _MIN_BED_SIDE <= depth <= _MAX_BED_SIDE and 0.0 <= gap <= 0.1):
         raise GeometryError(
             f"a bed is from {_MIN_BED_SIDE * 1e3:g} to {_MAX_BED_SIDE * 1e3:g} mm wide and deep, with gaps from 0 to "

@@ -15,9 +15,10 @@ from scipy.spatial import cKDTree
 
 from coneskin.design.cable_lattice import CableLattice, length_of
 from coneskin.design.cable_tree import CableRouter, CableTree, bundle_radius, loop_length
-from coneskin.design.robot_design import _cable_section, _swept
+from coneskin.design.robot_design import _cable_section
 from coneskin.design.sheets.cable_way import SphereBody
 from coneskin.design.sheets.sheet_design import DesignOptions, SheetDesign, design_sheets
+from coneskin.design.swept_space import _swept, _swept_beside
 from coneskin.geometry.drawing.electrode_layout import ElectrodePlan
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh
@@ -141,7 +142,7 @@ def test_cables_share_their_way_and_are_summed() -> None:
     short, long = (cable[-1].points for cable in tree.cables)
     assert np.array_equal(short[-1], long[-1]), "one place at the foot"
     assert long[-1, 2] < 0.025
-    standing = CableLattice(MESHES["base"], (), (), 0.004, Pose())
+    standing = CableLattice(MESHES["base"], (), (), 0.004, np.array([0.0, 0.0, 1.0]))
     assert standing.places[:, 2].min() >= 0.004, "none goes through what the robot stands on"
     assert [(section.place, sensors) for section, sensors in tree.bundles()] == [
         ("base", (0, 1)),
@@ -158,13 +159,41 @@ def test_cables_share_their_way_and_are_summed() -> None:
     assert tree.as_data()["cables"][1]["sections"][1]["range_deg"] == pytest.approx(np.degrees(RANGE), abs=1e-3)
 
 
+def test_the_foot_is_where_the_base_is_bolted_down_even_from_a_ceiling() -> None:
+    sheets, tree = robot()
+    turned = Pose.from_rotation_vector((math.pi, 0.0, 0.0))
+    mount = replace(JOINT, name="mount", parent="world", child="base", origin=turned, lower=0.0, upper=0.0)
+    hung = CableRouter((replace(mount, limits=(0.0, 0.0)), JOINT), MESHES, sheets, lambda _: {}).tree()
+    assert hung.cables[1][-1].points[-1, 2] < 0.025, "in the frame of the base"
+    assert tree.cables[1][-1].points[-1, 2] < 0.025
+
+
+def test_a_sweep_passes_frames_without_a_body() -> None:
+    """A frame before the joint, or one shifted along its axis behind it, changes nothing but how it is written."""
+    direct = _swept_beside("base", [JOINT], MESHES, {})["arm"].points
+    still = replace(JOINT, name="flange", origin=Pose(), lower=0.0, upper=0.0, limits=(0.0, 0.0))
+    up = Pose(translation=(0.0, 0.0, 0.01))
+    before = replace(still, child="frame", origin=JOINT.origin), replace(JOINT, parent="frame", origin=Pose())
+    behind = (
+        replace(JOINT, child="frame", origin=JOINT.origin @ up.inverse()),
+        replace(still, parent="frame", origin=up),
+    )
+    for joints in (before, behind):
+        for link in ("base", "arm"):
+            own = _swept_beside(link, joints, MESHES, {})
+            assert list(own) == [{"base": "arm", "arm": "base"}[link]]
+        swept = _swept_beside("base", joints, MESHES, {})["arm"].points
+        assert cKDTree(direct).query(swept)[0].max() < 3e-3
+        assert cKDTree(swept).query(direct)[0].max() < 3e-3
+
+
 def test_a_cable_without_a_way_is_named_with_what_bars_it() -> None:
     sheets = robot()[0]
     full = sheet_on("base", Frustum(0.05, 0.05, 0.1), 0.12, SLIM)
     tree = laid(("base", full), sheets[1])
     assert tree.cables[0], "it leaves towards the foot, or there is none"
     assert tree.cables[1] == ()
-    assert "No cable is laid for sensor 1: a bundle of 6 mm finds no way past sheet 1 on base." in tree.reasons
+    assert "No cable is laid for sensor 1: a bundle of 8 mm finds no way past sheet 1 on base." in tree.reasons
     assert (tree.length(1), tree.ohms(1)) == (0.0, 0.0)
     filled = CableRouter((JOINT,), MESHES, sheets, lambda _: {"": SphereBody(MESHES["base"].vertices, 1.0)}).tree()
     assert filled.reasons == ("No cable is laid for sensor 0, 1: no place at the foot of base is free.",)

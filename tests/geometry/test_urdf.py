@@ -9,7 +9,7 @@ import pytest
 
 from coneskin.core.errors import MeshError
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.urdf import load_urdf_link, urdf_joints, urdf_links
+from coneskin.geometry.urdf import joints_inwards, load_urdf_link, urdf_joints, urdf_links
 
 from .synthetic import frustum
 from .test_mesh import write_dae, write_stl
@@ -152,13 +152,18 @@ def test_a_link_whose_name_is_no_folder_of_its_own_is_refused(tmp_path: Path, na
         urdf_links(file)
 
 
+LIMIT = '<limit lower="-1" upper="1"/>'
+
+
 @pytest.mark.parametrize(
     ("joints", "limit", "words"),
     [
-        ("ab bc ca", "", "joints form a tree.*'b' does"),
-        ("ab cb", "", "joints form a tree.*'b' does"),
-        ("aa", "", "joints form a tree.*'a' does"),
-        ("ab bd", "", "no link of the file has that name"),
+        ("ab bc ca", LIMIT, "joints form a tree.*'b' does"),
+        ("ab cb", LIMIT, "joints form a tree.*'b' does"),
+        ("aa", LIMIT, "joints form a tree.*'a' does"),
+        ("ab bd", LIMIT, "no link of the file has that name"),
+        ("ab", "", "joint j: a revolute joint needs a limit with lower and upper"),
+        ("ab", f'{LIMIT}<axis xyz="0 0 0"/>', "joint j: the axis of a revolute joint must not be 0 0 0"),
         ("ab", '<limit lower="1" upper="-1"/>', "got 1 and -1"),
         ("ab", '<limit lower="nan" upper="1"/>', "got nan and 1"),
     ],
@@ -169,3 +174,29 @@ def test_joints_that_are_no_tree_are_refused(tmp_path: Path, joints: str, limit:
     file.write_text(f"<robot name='r'><link name='a'/><link name='b'/><link name='c'/>{bodies}</robot>")
     with pytest.raises(MeshError, match=words):
         urdf_joints(file)
+
+
+def test_an_axis_of_a_fixed_joint_is_nothing_and_a_planar_joint_is_refused(tmp_path: Path) -> None:
+    """CAD programs write zeros for the axis of what they fix."""
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{}"><parent link="a"/><child link="b"/>'
+        '<axis xyz="0 0 0"/></joint></robot>'
+    )
+    file = tmp_path / "r.urdf"
+    file.write_text(text.format("fixed"))
+    assert urdf_joints(file)[0].axis == (1.0, 0.0, 0.0)
+    file.write_text(text.format("planar"))
+    with pytest.raises(MeshError, match="joint j: a joint is revolute, continuous, prismatic or fixed, got 'planar'"):
+        urdf_joints(file)
+
+
+def test_frames_without_a_mesh_are_passed_on_the_way_to_the_base(tmp_path: Path) -> None:
+    joint = '<joint name="{0}{1}" type="fixed"><parent link="{0}"/><child link="{1}"/></joint>'
+    bodies = "".join(f'<link name="{name}"/>' for name in "abcd") + "".join(
+        joint.format(*pair) for pair in ("ab", "bc")
+    )
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{bodies}</robot>')
+    joints = urdf_joints(tmp_path / "r.urdf")
+    inner, between = joints_inwards("c", joints, {"a", "c"})
+    assert (inner, [one.name for one in between]) == ("a", ["bc", "ab"])
+    assert joints_inwards("a", joints, {"a", "c"}) == joints_inwards("d", joints, {"a"}) == ("", ())

@@ -169,14 +169,14 @@ def _design_robot(args: argparse.Namespace, common: dict[str, Any]) -> int:
         included = "" if count <= design.included else ", not included"
         area = f"{1e4 * one.area:.1f} of {1e4 * one.active:.1f} cm2 touchable"
         print(f"{one.wires:3d} wires  {1e4 * one.total:7.1f} cm2  {one.link} {one.number}, {area}{included}")
-    lengths = (f"{design.cables.length(sensor):.2f}" for sensor, cable in enumerate(design.cables.cables) if cable)
-    print(
-        "\n".join((f"cables to the box at the foot: {', '.join(lengths)} m", *design.cables.reasons, *design.reasons))
-    )
+    lengths = [f"{design.cables.length(sensor):.2f}" for sensor, cable in enumerate(design.cables.cables) if cable]
+    cables = [f"ways of the cables to the box at the foot: {', '.join(lengths)} m"] if lengths else []
+    print("\n".join((*cables, *design.cables.reasons, *design.reasons)))
     said = {Path(args.link).name.partition(".")[0].lower(), *(word.lower() for word in common["arguments"].values())}
-    model = next((name for name in MODEL_NAMES if name.lower() in said), DEFAULT_MODEL)
-    folder = shlex.quote(str(args.output))
-    print_hint(f"next: coneskin init {folder} --simulated --arm {model}; on another arm than a UR: --skin-only")
+    model = next((name for name in MODEL_NAMES if name.lower() in said), None)
+    init = f"next: coneskin init {shlex.quote(str(args.output))} --simulated"
+    alone = f"{init} --skin-only; if it is an arm of UR's: --arm {DEFAULT_MODEL}, or another model"
+    print_hint(f"{init} --arm {model}" if model else alone)
     return 0
 
 

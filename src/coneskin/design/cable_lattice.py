@@ -14,10 +14,9 @@ import numpy as np
 from coneskin.core.arrays import Bools, Floats, Ints
 from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import Mesh
-from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
 
-from .sheets.cable_way import CABLE_RADIUS, Body, SheetBody
+from .sheets.cable_way import CABLE_RADIUS, MOUNT_REACH, Body, SheetBody
 from .sheets.sheet_design import SheetDesign
 
 LATTICE_STEP = 5e-3  # m
@@ -50,7 +49,7 @@ class CableLattice:
         sheets: Sequence[SheetDesign],
         beside: Sequence[Body],
         radius: float,
-        robot_link: Pose | None = None,
+        up: Floats | None = None,
     ) -> None:
         """Find the places.
 
@@ -59,7 +58,7 @@ class CableLattice:
             sheets: on it.
             beside: what moves beside it.
             radius: of the bundle [m].
-            robot_link: pose of a link that stands on something, from which z leads upwards; None for another one.
+            up: unit vector away from what the link is bolted to, shape (3,); None of a link that moves.
         """
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -72,10 +71,8 @@ class CableLattice:
         self._bodies: list[Body] = [SheetBody(sheet.place, sheet.options.stack.thickness) for sheet in sheets]
         self._bodies += [sheet.apron.body() for sheet in sheets]
         self._cables = [sheet.way.body() for sheet in sheets]
-        self._robot_link = robot_link
-        self._lowest = -math.inf
-        if robot_link is not None:
-            self._lowest = float(robot_link.apply_all(mesh.vertices)[:, 2].min()) + radius
+        self._up = up
+        self._lowest = -math.inf if up is None else float((mesh.vertices @ up).min()) + radius
         reach = (
             radius
             + _SUPPORT_DEPTH
@@ -105,10 +102,10 @@ class CableLattice:
 
     @property
     def foot(self) -> Ints:
-        """Places beside the lowest of the link, by their numbers."""
-        if self._robot_link is None:
+        """Places beside what the link is bolted to, by their numbers."""
+        if self._up is None:
             return np.empty(0, int)
-        return np.flatnonzero(self._robot_link.apply_all(self.places)[:, 2] < self._lowest + 2.0 * LATTICE_STEP)
+        return np.flatnonzero(self.places @ self._up < self._lowest + 2.0 * LATTICE_STEP)
 
     def free(self, points: Floats, support: float = _BRIDGED_DEPTH) -> Bools:
         """Return where the middle of the bundle may be, shape (n,).
@@ -118,8 +115,8 @@ class CableLattice:
             support: how far below it link or sheet may be [m].
         """
         free = np.ones(len(points), bool)
-        if self._robot_link is not None:
-            free = self._robot_link.apply_all(points)[:, 2] >= self._lowest
+        if self._up is not None:
+            free = points @ self._up >= self._lowest
         away, nearest = self._tree.query(points, distance_upper_bound=self.radius + support + _STEP_MARGIN)
         on = np.isfinite(away)
         nearest = nearest[on]
@@ -186,14 +183,18 @@ class CableLattice:
         count = max(2, math.ceil(float(np.linalg.norm(end - start)) / _LINE_STEP))
         return bool(self.free(start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)).all())
 
-    def led_from(self, sheet: int, place: Floats) -> bool:
-        """Tell whether a cable goes straight from the connector of a sheet to a place [m], shape (3,)."""
+    def led_from(self, sheet: int, place: Floats, clearance: float) -> bool:
+        """Tell whether a cable goes straight from the connector of a sheet to a place [m], shape (3,).
+
+        Its middle is at least a clearance [m] from the link, but for the connector itself.
+        """
         start = self.connector(sheet)
         way = place - start
         length = float(np.linalg.norm(way))
         line = start + np.linspace(0.0, 1.0, math.ceil(length / _LINE_STEP) + 1)[:, None] * way
         bodies = [*self._bodies, *self._beside, *(cable for k, cable in enumerate(self._cables) if k != sheet)]
         met = float(self.rays.cast(start[None], way[None] / length)[0][0]) < length
+        met |= bool((self._tree.query(line[np.linalg.norm(line - start, axis=1) > MOUNT_REACH])[0] < clearance).any())
         return not met and not any(body.near(line, 0.9 * CABLE_RADIUS).any() for body in bodies)
 
     def connector(self, sheet: int) -> Floats:

@@ -18,7 +18,7 @@ import numpy as np
 from coneskin.core.arrays import Floats, Ints
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.urdf import UrdfJoint, link_poses
+from coneskin.geometry.urdf import UrdfJoint, joints_inwards, link_poses
 
 from .cable_lattice import CableLattice, length_of
 from .sheets.cable_way import CABLE_RADIUS, SphereBody
@@ -33,6 +33,7 @@ _CROSSING_REACH = 0.04  # m; of them from what moves on the other side
 _LOOP_REACH = 0.15  # m; from the axis: a wider loop sweeps past the arm
 _LOOP_ANGLES, _LOOP_POINTS = 5, 33  # at which, and points at which, it is held against both links
 _LOOPS_TRIED, _LOOPS_AT_ONCE = 40, 200  # from each place; the shortest one that meets neither link is taken
+_LEAST_OFF = 5e-3  # m; of the next link from a base, each in its middle; nearer ones say nothing of its ends
 _LEAST_PART = 100  # places of a lattice that are joined; fewer are a niche
 
 
@@ -133,8 +134,12 @@ class CableTree:
 
 
 def bundle_radius(count: int) -> float:
-    """Return the radius of some cables that are tied together [m]: loose wires fill as much of it as of one cable."""
-    return CABLE_RADIUS * math.sqrt(count)
+    """Return the radius of some cables that are tied together [m]: of the circle around as many equal ones.
+
+    Up to seven as proven (R. L. Graham, 1968), beyond by a density of .68, below which no known packing is.
+    """
+    proven = (1.0, 2.0, 2.1547, 2.4142, 2.7013, 3.0, 3.0)
+    return CABLE_RADIUS * (proven[count - 1] if count <= len(proven) else math.sqrt(count / 0.68))
 
 
 _Exit = tuple[CableSection, int] | None  # past the joint, and the place beyond it; none at the foot of the robot
@@ -190,7 +195,7 @@ class CableRouter:
         beside: Callable[[str], Mapping[str, SphereBody]],
     ) -> None:
         self._meshes, self._sheets, self._beside = meshes, sheets, beside
-        self._above = {joint.child: joint for joint in joints}
+        self._joints = joints
         self._poses = link_poses(joints, [0.0] * len(joints))
         self._routed: dict[str, _RoutedLink | str] = {}
         self._spaces: dict[str, Mapping[str, SphereBody]] = {}
@@ -212,17 +217,30 @@ class CableRouter:
             if isinstance(cable, str):
                 reasons.setdefault(cable, []).insert(0, sensor)
         said = [f"No cable is laid for sensor {', '.join(map(str, bare))}: {why}." for why, bare in reasons.items()]
+        feet = sorted({sections[-1].place for sections in cables if sections})
+        if len(feet) > 1:
+            said.insert(0, f"The cables end at the feet of {' and '.join(feet)}: a box for each.")
         return CableTree(tuple(reversed(cables)), tuple(reversed(said)))
 
-    def _towards_base(self, link: str) -> tuple[str, list[UrdfJoint]]:
+    def _towards_base(self, link: str) -> tuple[str, tuple[UrdfJoint, ...]]:
         """Return the next link with a mesh towards the base, and the joints between; no name at the base."""
-        joints = []
-        while link in self._above:
-            joints.append(self._above[link])
-            link = joints[-1].parent
-            if link in self._meshes:
-                return link, joints
-        return "", []
+        return joints_inwards(link, self._joints, self._meshes)
+
+    def _up(self, base: str) -> Floats:
+        """Return the unit vector from what a base is bolted to, in its frame: the next link is at its other end."""
+        outer = next((link for link in self._meshes if self._towards_base(link)[0] == base), None)
+        to_base = self._poses.get(base, Pose()).inverse()
+        upright = np.array(to_base.rotate((0.0, 0.0, 1.0)))
+        if outer is None:
+            return upright
+        joint = self._towards_base(outer)[1][-1]
+        frame = to_base @ self._poses[joint.parent] @ joint.origin @ Pose.along(joint.axis)
+        middle = (to_base @ self._poses[outer]).apply_all(self._meshes[outer].own_frame[0][None])[0]
+        away, axis = middle - self._meshes[base].own_frame[0], np.array(frame.rotation)[:, 2]
+        along = float(away @ axis) * axis  # of an upright joint; past one that lies is where the base ends
+        up = along if float(np.linalg.norm(along)) > 0.5 * float(np.linalg.norm(away)) else away
+        off = float(np.linalg.norm(up))
+        return np.asarray(up / off) if off > _LEAST_OFF else upright
 
     def _cable(self, link: str, sheet: int) -> tuple[CableSection, ...] | str:
         """Return the sections of the cable of a sheet on a link, or why there is no way."""
@@ -235,7 +253,9 @@ class CableRouter:
         near = np.flatnonzero(off < _CONNECTOR_REACH)
         near = near[np.argsort(routed.away[near] + off[near], kind="stable")]
         near = near[np.isfinite(routed.away[near])]
-        first = next((k for k in near if lattice.led_from(sheet, lattice.places[k])), None)
+        # where no place is clear of the link by a cable's radius, one is bent over an edge there
+        tried = ((k, clearance) for clearance in (1.1 * CABLE_RADIUS, 0.0) for k in near)
+        first = next((k for k, clearance in tried if lattice.led_from(sheet, lattice.places[k], clearance)), None)
         if first is None:
             return self._obstacle(link, routed, "its connector", lambda places: np.linalg.norm(places - start, axis=1))
         sections, points, place = [], start[None], int(first)
@@ -265,9 +285,9 @@ class CableRouter:
     ) -> _RoutedLink | str:
         sheets = [sheet for name, sheet in self._sheets if name == link]
         spaces = self._spaces[link] = self._beside(link)
-        standing = None if inner else self._poses.get(link, Pose())
+        up = None if inner else self._up(link)
         radius = bundle_radius(self._counts[link])
-        lattice = CableLattice(self._meshes[link], sheets, list(spaces.values()), radius, standing)
+        lattice = CableLattice(self._meshes[link], sheets, list(spaces.values()), radius, up)
         if inner is None:
             sizes = np.bincount(lattice.parts)[lattice.parts[lattice.foot]]
             if not len(sizes):

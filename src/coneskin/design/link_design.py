@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from coneskin.core.errors import GeometryError, MeshError
 from coneskin.geometry.drawing.electrode_layout import NARROWEST_PLAN
+from coneskin.geometry.drawing.nesting import require_nesting
 from coneskin.geometry.fit.fit_options import check_names
 from coneskin.geometry.frustum import Frustum
 from coneskin.geometry.mesh import Mesh, load_mesh, terms_of
@@ -328,8 +329,9 @@ def design_link(
     """
     if folder is not None:
         check_target(Path(folder), replace)
+        require_nesting()  # before the search, which takes a minute
         if files is not None and files.step:
-            require_step_writer()  # before the search, which takes a minute
+            require_step_writer()
     said = set()
 
     def say(step: str) -> None:

@@ -19,11 +19,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from coneskin.core.arrays import Floats
 from coneskin.core.errors import GeometryError, MeshError
+from coneskin.geometry.drawing.nesting import require_nesting
 from coneskin.geometry.fit.axis_plan import FittedSheet
 from coneskin.geometry.fit.side import longest_run
-from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.fit.touch_weights import free_shares
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
@@ -37,12 +36,9 @@ from .link_design import LinkDesign, _fit_link, as_built, room_for
 from .report import _table
 from .sheets.cable_way import SphereBody
 from .sheets.sheet_design import DesignOptions, SheetDesign, design_assembly
+from .swept_space import _swept_beside
 from .workshop.build_figures import BuildFigures, bill_of_materials, in_mm, side_name
 
-_SWEEP_SAMPLES = 20_000  # of a link that moves beside another
-_SAMPLE_RADIUS = 1.5e-3  # m; of the space about each of them
-_SWEEP_CELL = 1.5e-3  # m; along, away from and around the axis
-_SWEEP_REACH = 0.02  # m; beyond a link, where tie and connector look for what comes near
 _SWEEP_CLEARANCE = 2e-3  # m; of a sheet from what moves beside it
 _SWEEP_ROW = 2e-3  # m; along a sheet
 _LEAST_SLANT = 0.03  # m; a shorter rest of a sheet is not offered
@@ -50,6 +46,7 @@ _TOUCH_GRID = (6, 24)  # places of an active area along and around
 _POSE_COUNT = 12
 _WIRES_PER_SHEET = 4
 _TIE_STEP = 0.1  # m; between places at which cables are fixed
+_END_LENGTH = 0.05  # m; at each end of a cable, to strip, to crimp and to lead it down to the link
 _CUT_STEP = 0.01  # m; cables are cut to multiples of it
 
 
@@ -82,68 +79,6 @@ class RobotDesign:
 
 
 _BuiltSheet = tuple[str, SheetDesign, BuildFigures]  # of a link, with its name before that of the sheet
-
-
-def _swept(axis: Pose, points: Floats, lower: float, upper: float, beside: Floats) -> SphereBody:
-    """Return the space that a link takes while a joint turns over its range, as far as it comes near another link.
-
-    Args:
-        axis: pose of the joint, whose axis is z.
-        points: of the link in that frame [m], shape (n, 3).
-        lower: least angle by which they are turned [rad].
-        upper: largest angle [rad].
-        beside: places of the other link in that frame [m], shape (n, 3).
-    """
-    low, high = beside.min(axis=0) - _SWEEP_REACH, beside.max(axis=0) + _SWEEP_REACH
-    away, azimuth = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
-    ring = np.round(away / _SWEEP_CELL).astype(int)
-    far = np.hypot(*np.maximum(-low, high)[:2])
-    ring[(points[:, 2] < low[2]) | (points[:, 2] > high[2]) | (away > far)] = -1
-    found = [np.empty((0, 3))]
-    for number in np.unique(ring[ring >= 0]):
-        height, row = np.unique(np.round(points[ring == number, 2] / _SWEEP_CELL), return_inverse=True)
-        count = max(1, math.ceil(math.tau * number))
-        step = math.tau / count
-        begins = np.zeros((len(height), count), bool)
-        begins[row, np.round((azimuth[ring == number] + lower) / step).astype(int) % count] = True
-        ahead = min(count - 1, math.ceil((upper - lower) / step))  # turns that are taken after each that begins
-        sums = np.cumsum(np.pad(np.hstack([begins[:, count - ahead :], begins]), ((0, 0), (1, 0))), axis=1)
-        at, turn = np.nonzero(sums[:, ahead + 1 :] > sums[:, :count])
-        swept = _SWEEP_CELL * np.stack([number * np.cos(step * turn), number * np.sin(step * turn), height[at]], axis=1)
-        found.append(swept[((swept > low) & (swept < high)).all(axis=1)])
-    return SphereBody(axis.apply_all(np.concatenate(found)), _SAMPLE_RADIUS)
-
-
-def _swept_beside(
-    link: str, joints: Sequence[UrdfJoint], meshes: Mapping[str, Mesh], skins: Mapping[str, LinkDesign]
-) -> dict[str, SphereBody]:
-    """Return the spaces of the links next to one, and of the sheets that they have already, by their names."""
-    spaces = {}
-    for joint in joints:
-        other = {joint.parent: joint.child, joint.child: joint.parent}.get(link)
-        if other is None or other not in meshes:
-            continue
-        mesh = meshes[other]
-        points = sample_surface(mesh, RayCaster(mesh), _SWEEP_SAMPLES).points
-        if other in skins:
-            points = np.concatenate([points, *(_outside(sheet) for sheet in skins[other].sheets)])
-        child = Pose.along(joint.axis)
-        parent = joint.origin @ child
-        if link == joint.parent:
-            axis, moved, ends = parent, child.inverse().apply_all(points), (joint.lower, joint.upper)
-        else:
-            axis, moved, ends = child, parent.inverse().apply_all(points), (-joint.upper, -joint.lower)
-        spaces[other] = _swept(axis, moved, *ends, axis.inverse().apply_all(meshes[link].vertices))
-    return spaces
-
-
-def _outside(sheet: SheetDesign) -> Floats:
-    """Return places of the outer face of a sheet, as near to each other as those of a link [m], shape (n, 3)."""
-    side = sheet.place.frustum
-    around = side.wrap * max(side.radius1, side.radius2)
-    u = np.linspace(0.0, side.slant, math.ceil(side.slant / (2.0 * _SAMPLE_RADIUS)) + 1)
-    phi = np.linspace(0.0, side.wrap, math.ceil(around / (2.0 * _SAMPLE_RADIUS)) + 1)
-    return sheet.outer_face(*np.meshgrid(u, phi, indexing="ij"))[0].reshape(-1, 3)
 
 
 def _assembled(
@@ -200,13 +135,17 @@ def design_robot(
 
     Raises:
         MeshError: the file or the mesh of a link cannot be read, or the joints are no tree.
-        GeometryError: no link can carry a sheet, wires allow none, wires and share are both given, the share is not
+        GeometryError: no link can carry a sheet, wires are fewer than those of a sheet, or given with a share, which is
             above 0 and at most 1, or the folder is in use; nothing is written then.
+        MissingExtra: as ``design_link``.
     """
+    if wires is not None and wires < _WIRES_PER_SHEET:
+        raise GeometryError(f"wires must be at least {_WIRES_PER_SHEET}, which a sheet has, got {wires}")
     if share is not None and not (wires is None and 0.0 < share <= 1.0):
         raise GeometryError(f"a share is above 0 % and at most 100 %, and excludes wires, got {100.0 * share:g} %")
     options = options or DesignOptions()
     check_target(Path(folder), replace)
+    require_nesting()  # before the search, which takes a minute
     meshes: dict[str, Mesh] = {}
     found: dict[str, LinkDesign] = {}
     reasons: list[str] = []
@@ -216,7 +155,7 @@ def design_robot(
         try:
             source, fit = _fit_link(link, None, packages, progress, arguments, **(room_for(options) | search))
         except MeshError as error:
-            why = "every link is read for what moves beside it; mend it, or take its mesh out of the URDF"
+            why = "every link is read for what moves beside it: mend it, or name its package (--package NAME=DIR)"
             raise MeshError(f"{link}: {error}; {why}") from error
         meshes[name] = source.mesh
         if fit.sheets:
@@ -247,11 +186,8 @@ def design_robot(
     if share is not None and offered:
         enough = share * (1.0 - 1e-9) * offered[-1].total  # as a sum, all of it may round to less
         included = next(count for count, one in enumerate(offered, 1) if one.total >= enough)
-    if not included:
-        raise GeometryError(
-            f"{robot}: {len(offered)} sheets are possible, {wires} wires allow none: a sheet has {_WIRES_PER_SHEET}. "
-            + "; ".join(reasons)
-        )
+    if not offered:
+        raise GeometryError(f"{robot}: no link can carry a sheet: {'; '.join(reasons)}")
     chosen: dict[str, LinkDesign] = {}
     for name, design in found.items():
         wanted = {one.number for one in offered[:included] if one.link == name}
@@ -378,6 +314,7 @@ def _write_robot(
     guides = []
     for number, (link, sheet, _) in enumerate(built):
         connector = f"{in_mm(sheet.way.connector_length)} from {side_name(sheet.way.side)}"
+        connector += ", on what is bolted to the link there" if sheet.way.hangs else ""
         guides.append((str(number), sheet.name, f"[report]({link}/report.md)", connector))
     head = "wires", "link", "sheet", "active [cm2]", "touchable [cm2]", "with all before [cm2]", "included"
     robot_picture = "![The robot with its sheets and cables from two sides.](robot.png)"
@@ -385,7 +322,9 @@ def _write_robot(
     lines = [
         f"# Skin of {Path(robot).name}",
         "",
-        f"{design.included} sheets, {_WIRES_PER_SHEET * design.included} wires. Touchable is the active area times the "
+        f"{design.included} sheets, {_WIRES_PER_SHEET * design.included} wires, with "
+        f"{design.offered[design.included - 1].total / design.offered[-1].total:.0%} of what all {len(design.offered)} "
+        "sheets that are possible would feel. Touchable is the active area times the "
         f"share of the half-space above it that the robot leaves free, over {_POSE_COUNT} poses drawn from its joints.",
         "",
         *_table(head, rows),
@@ -417,8 +356,8 @@ def _write_robot(
 
 
 def _cut(length: float) -> float:
-    """Return a length to which a cable is cut [m]."""
-    return math.ceil(length / _CUT_STEP - 1e-9) * _CUT_STEP
+    """Return the length to which a cable is cut, with what its ends take [m]."""
+    return math.ceil((length + 2.0 * _END_LENGTH) / _CUT_STEP - 1e-9) * _CUT_STEP
 
 
 def _cable_items(tree: CableTree) -> list[tuple[str, str, str]]:
@@ -427,11 +366,17 @@ def _cable_items(tree: CableTree) -> list[tuple[str, str, str]]:
     if not lengths:
         return []
     on_links = math.fsum(section.length for section, _ in tree.bundles() if section.limits is None)
+    loops = sum(section.limits is not None for section, _ in tree.bundles())
     each = ", ".join(f"sensor {sensor}: {length:.2f} m" for sensor, length in lengths.items())
     return [
         ("cable of four stranded wires 0.14 mm2, at most 4 mm thick", f"{sum(lengths.values()):.2f} m in all", each),
         ("label with a sensor number", f"{2 * len(lengths)}", "both ends of each cable"),
-        ("self-adhesive cable-tie mount and cable tie", f"{math.ceil(on_links / _TIE_STEP)}", "cables on bare links"),
+        (
+            "self-adhesive cable-tie mount and cable tie",
+            f"{math.ceil(on_links / _TIE_STEP) + 2 * loops}",
+            "cables on bare links, and both ends of each loop",
+        ),
+        ("board of `coneskin firmware`, and a box for all", f"{len(tree.cables)}", "a board for each sheet"),
     ]
 
 
@@ -448,12 +393,14 @@ def _cable_section(tree: CableTree, sheets: Sequence[SheetDesign]) -> Iterator[s
         rows.append([str(sensor), sheets[sensor].name, *own])
     yield from _table(("sensor number", "sheet", "cable [m]", "joints passed", "each wire [ohm]"), rows)
     yield ""
-    yield f"Lengths include {in_mm(BOX_LENGTH)} from the foot to the box. `lead_ohm` in `sensor.toml` has the ohms."
+    yield f"Cut them to these lengths: {in_mm(BOX_LENGTH)} lead from the foot to the box, {in_mm(_END_LENGTH)} are for"
+    yield "each end. `lead_ohm` in `sensor.toml` has the ohms, and 1 ohm for the switch on the board."
     yield "Cables that go the same way are tied together. On a link the longest of them is given."
     yield ""
     rows = []
     for section, sensors in tree.bundles():
-        what = f"loop past {section.place}" if section.limits else section.place
+        over = "past" if section.limits == (0.0, 0.0) else "loop past"
+        what = f"{over} {section.place}" if section.limits else section.place
         wires = f"{len(sensors)}, {_WIRES_PER_SHEET * len(sensors)}"
         numbers = ", ".join(map(str, sensors))
         rows.append([what, in_mm(section.length), numbers, wires, in_mm(2.0 * bundle_radius(len(sensors)))])
@@ -462,8 +409,11 @@ def _cable_section(tree: CableTree, sheets: Sequence[SheetDesign]) -> Iterator[s
     yield f"* Fix the cables every {in_mm(_TIE_STEP)}, with mounts on a link, with tape on a sheet."
     yield "* Over a sheet they lie only where nothing senses, as beside its seam. `design.json` has the ways."
     yield "* No tie goes around a sheet. It would press as a touch does."
-    yield "* A loop goes around its joint, and is long enough over the whole range."
-    yield f"* Fix both ends of a loop, and bend it no tighter than {in_mm(BEND_RADIUS)}."
+    yield "* A loop hangs slack while its joint is in the middle of the range. At both ends of the range it lies around"
+    yield f"  the joint, one way or the other. Fix both its ends, and bend it no tighter than {in_mm(BEND_RADIUS)}."
+    yield "* These cables have no pairs: at J1 of each board join E and S of each electrode. `board.md` of `coneskin"
+    yield "  firmware` has a cable of pairs, for a board beside its sheet."
+    yield "* Press each sheet once all are connected. `coneskin doctor` names the sensor: no two cables are exchanged."
     for section, _ in tree.bundles():
         yield from _winding(section)
     yield from (f"* {reason}" for reason in tree.reasons)

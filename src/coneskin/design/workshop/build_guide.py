@@ -205,7 +205,7 @@ def _cable_steps(tab: float) -> Iterator[str]:
         "Once every sheet and collar is on, lead the four wires together by the *cable*'s way. Glue the cable-tie "
         "mount at its place. Lay the wires flat, leave a loop of 20 mm so that no pull reaches a tab, and tie them "
         "down. Crimp the connector: pin 1 A (red), pin 2 B (black), pin 3 C (yellow), pin 4 D (green). Write the "
-        "sheet's number on both halves of the connector. *Check:* pull each wire as hard as 3 N behind the tie: "
+        "sensor's number on both halves of the connector. *Check:* pull each wire as hard as 3 N behind the tie: "
         "nothing moves before it; and move the joint of the arm through its whole range by hand (freedrive): nothing "
         "is pinched or stretched."
     )
