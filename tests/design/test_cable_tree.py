@@ -173,7 +173,7 @@ def test_a_sweep_passes_frames_without_a_body() -> None:
     direct = _swept_beside("base", [JOINT], MESHES, {})["arm"].points
     still = replace(JOINT, name="flange", origin=Pose(), lower=0.0, upper=0.0, limits=(0.0, 0.0))
     up = Pose(translation=(0.0, 0.0, 0.01))
-    before = replace(still, child="frame", origin=JOINT.origin), replace(JOINT, parent="frame", origin=Pose())
+    before = replace(still, child="frame", origin=up), replace(JOINT, parent="frame", origin=up.inverse())
     behind = (
         replace(JOINT, child="frame", origin=JOINT.origin @ up.inverse()),
         replace(still, parent="frame", origin=up),
