@@ -171,6 +171,11 @@ def link_poses(joints: Sequence[UrdfJoint], angles: Sequence[float]) -> dict[str
     return poses
 
 
+def joint_frame(joint: UrdfJoint, poses: Mapping[str, Pose]) -> Pose:
+    """Return the frame in which a joint turns about z from its angle 0, as its parent stands in some poses of links."""
+    return poses[joint.parent] @ joint.origin @ Pose.along(joint.axis)
+
+
 def load_urdf_link(
     path: str | Path,
     link: str,

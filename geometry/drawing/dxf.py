@@ -26,6 +26,7 @@ def to_dxf(sheets: Sequence[CutSheet], arcs: ArcStyle = "bulge", tolerance: floa
         arcs: "bulge" for closed polylines with true arcs; "arc-line" for separate LINE and ARC entities, for readers
             that ignore bulges; "flattened" for polylines of straight lines.
         tolerance: largest distance of flattened lines from the arcs [m].
+
     Raises:
         MissingExtra: ezdxf is not installed.
         GeometryError: an unknown style of arcs, or a tolerance that is not above 0.

@@ -150,6 +150,7 @@ _BLEED_WIDTH = 4.0  # mm; width printed beyond a window
 
 def to_pdf(sheets: Sequence[CutSheet], page: PageSize = "A4", title: str = "coneskin") -> bytes:
     """Write cut sheets as one PDF: a page map first, then the pages to print.
+
     Raises:
         GeometryError: an unknown paper size.
     """

@@ -173,7 +173,8 @@ def test_a_sweep_passes_frames_without_a_body() -> None:
     direct = _swept_beside("base", [JOINT], MESHES, {})["arm"].points
     still = replace(JOINT, name="flange", origin=Pose(), lower=0.0, upper=0.0, limits=(0.0, 0.0))
     up = Pose(translation=(0.0, 0.0, 0.01))
-    before = replace(still, child="frame", origin=up), replace(JOINT, parent="frame", origin=up.inverse())
+    aside = Pose(translation=(0.02, 0.0, 0.01))
+    before = replace(still, child="frame", origin=aside), replace(JOINT, parent="frame", origin=aside.inverse())
     behind = (
         replace(JOINT, child="frame", origin=JOINT.origin @ up.inverse()),
         replace(still, parent="frame", origin=up),

@@ -18,7 +18,7 @@ import numpy as np
 from coneskin.core.arrays import Floats, Ints
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
-from coneskin.geometry.urdf import UrdfJoint, joints_inwards, link_poses
+from coneskin.geometry.urdf import UrdfJoint, joint_frame, joints_inwards, link_poses
 
 from .cable_lattice import CableLattice, length_of
 from .sheets.cable_way import CABLE_RADIUS, SphereBody
@@ -234,7 +234,7 @@ class CableRouter:
         if outer is None:
             return upright
         joint = self._towards_base(outer)[1][-1]
-        frame = to_base @ self._poses[joint.parent] @ joint.origin @ Pose.along(joint.axis)
+        frame = to_base @ joint_frame(joint, self._poses)
         middle = (to_base @ self._poses[outer]).apply_all(self._meshes[outer].own_frame[0][None])[0]
         away, axis = middle - self._meshes[base].own_frame[0], np.array(frame.rotation)[:, 2]
         along = float(away @ axis) * axis  # of an upright joint; past one that lies is where the base ends
@@ -350,7 +350,7 @@ class CableRouter:
         ends, others = lattice.places[ours], inner.lattice.places[theirs]
         ours = ours[_nearest(ends, self._moving(parent, link, others))]
         theirs = theirs[_nearest(others, self._moving(link, parent, ends))]
-        frame = self._poses[joint.parent] @ joint.origin @ Pose.along(joint.axis)
+        frame = joint_frame(joint, self._poses)
         turned = frame.inverse() @ self._poses[link], frame.inverse() @ self._poses[parent]
         ours, a = _within(ours, turned[0].apply_all(lattice.places[ours]))
         theirs, b = _within(theirs, turned[1].apply_all(inner.lattice.places[theirs]))

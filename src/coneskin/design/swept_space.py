@@ -12,7 +12,7 @@ from coneskin.geometry.fit.surface_samples import sample_surface
 from coneskin.geometry.mesh import Mesh
 from coneskin.geometry.pose import Pose
 from coneskin.geometry.ray_casting import RayCaster
-from coneskin.geometry.urdf import UrdfJoint, joints_inwards
+from coneskin.geometry.urdf import UrdfJoint, joint_frame, joints_inwards, link_poses
 
 from .link_design import LinkDesign
 from .sheets.cable_way import SphereBody
@@ -62,34 +62,21 @@ def _swept_beside(
     Links are next to each other where one joint moves between them, whatever frames without a mesh there are besides.
     """
     spaces = {}
+    poses = link_poses(joints, [0.0] * len(joints))
     for outer in meshes:
         inner, between = joints_inwards(outer, joints, meshes)
         moving = [joint for joint in between if joint.upper > joint.lower]
         if not inner or link not in (inner, outer) or len(moving) > 1:
             continue
         joint = (moving or between)[0]
-        at = between.index(joint)
-        turned = Pose.along(joint.axis)  # the frame in which the joint turns about z
-        on_inner = _along(between[at:]) @ turned
-        on_outer = _along(between[:at]).inverse() @ turned
-        other = inner if link == outer else outer
+        other, turns = (outer, (joint.lower, joint.upper)) if link == inner else (inner, (-joint.upper, -joint.lower))
         points = sample_surface(meshes[other], RayCaster(meshes[other]), _SWEEP_SAMPLES).points
         if other in skins:
             points = np.concatenate([points, *(_outside(sheet) for sheet in skins[other].sheets)])
-        if link == inner:
-            axis, moved, ends = on_inner, on_outer.inverse().apply_all(points), (joint.lower, joint.upper)
-        else:
-            axis, moved, ends = on_outer, on_inner.inverse().apply_all(points), (-joint.upper, -joint.lower)
-        spaces[other] = _swept(axis, moved, *ends, axis.inverse().apply_all(meshes[link].vertices))
+        frame = joint_frame(joint, poses)
+        axis, moved = poses[link].inverse() @ frame, (frame.inverse() @ poses[other]).apply_all(points)
+        spaces[other] = _swept(axis, moved, *turns, axis.inverse().apply_all(meshes[link].vertices))
     return spaces
-
-
-def _along(joints: Sequence[UrdfJoint]) -> Pose:
-    """Return the pose of what joints at their angle 0 lead to, the innermost of them last."""
-    pose = Pose()
-    for joint in reversed(joints):
-        pose = pose @ joint.origin
-    return pose
 
 
 def _outside(sheet: SheetDesign) -> Floats:
