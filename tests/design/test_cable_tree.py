@@ -186,6 +186,8 @@ def test_a_sweep_passes_frames_without_a_body() -> None:
         swept = _swept_beside("base", joints, MESHES, {})["arm"].points
         assert cKDTree(direct).query(swept)[0].max() < 3e-3
         assert cKDTree(swept).query(direct)[0].max() < 3e-3
+    raised = _swept_beside("base", [replace(JOINT, origin=up)], MESHES, {})["arm"].points
+    assert cKDTree(up.apply_all(direct)).query(raised)[0].max() < 3e-3, "it stands where its joint does"
 
 
 def test_a_cable_without_a_way_is_named_with_what_bars_it() -> None:
